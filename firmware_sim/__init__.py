@@ -1,0 +1,1 @@
+"""The hardware side: what the canceller costs on a device. No Taichi, no serial port."""

@@ -1,0 +1,202 @@
+"""Drain, match and predict a launch of events, in order, over packed state that the host owns.
+
+A cell is 4 bytes, ``t' << 2 | p << 1 | valid`` with ``t'`` in 30 bits relative to the launch's base time; 0 is empty.
+The table carries a border as wide as the spatial gate, so that a window never needs a bounds test. Gate in time,
+polarity and valid bit are one comparison: with ``want`` the packed cell at the gate's early edge, ``cell − want``
+rotated right by two is at most ``2·ε_t`` exactly when all three hold.
+"""
+
+from functools import cache
+
+from tiegocancel.kernels.runtime import start, ti
+
+__all__ = ["CURSORS", "MAX_UNROLLED", "cancel"]
+
+CURSORS = ("head", "pending", "entry", "events", "suppressed", "predicted", "outside", "overflow", "overwritten",
+           "ring_high_water")  # fmt: skip
+"""Names of ``cursors`` int64[10]: where ring and schedule stand, then the counters."""
+
+MAX_UNROLLED = 32
+"""A window of more offsets than this is searched by a loop instead of unrolled code."""
+
+
+def cancel(*, polarity, offsets, by_schedule, track_source, state):
+    """Run one launch; ``state`` holds the kernel's arguments by name, as :func:`_kernel` lists them.
+
+    ``polarity``: opposite, equal or ignore; ``offsets``: window as linear cell offsets, in order of preference;
+    ``by_schedule``: predict with ``coefficients``, else ``ahead`` holds the targets; ``track_source``: fill ``source``.
+    """
+    start()
+    unrolled = len(offsets) if len(offsets) <= MAX_UNROLLED else 0
+    _kernel(polarity, unrolled, by_schedule, track_source)(**state)
+
+
+@cache
+def _kernel(polarity, unrolled, by_schedule, track_source):
+    """Compile one variant; the number of offsets is part of it, their values are not."""
+    flip = 1 if polarity == "equal" else 0
+    blur = 2 if polarity == "ignore" else 0
+
+    @ti.kernel
+    def run(
+        count: ti.i32,  # events of this launch, from `first`
+        first: ti.i32,
+        base_us: ti.i64,  # 0 ≤ t − base < 2^29
+        horizon_us: ti.u32,
+        gate_us: ti.u32,
+        width: ti.i32,
+        height: ti.i32,
+        stride: ti.i32,  # cells from one row of the table to the next
+        origin: ti.i32,  # cell of pixel (0, 0)
+        capacity: ti.i32,
+        t: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [n] µs
+        x: ti.types.ndarray(dtype=ti.u16, ndim=1),  # [n] px
+        y: ti.types.ndarray(dtype=ti.u16, ndim=1),  # [n] px
+        p: ti.types.ndarray(dtype=ti.u8, ndim=1),  # [n]
+        ahead: ti.types.ndarray(dtype=ti.i32, ndim=1),  # [n] cell of the prediction, −1 outside; [1] when by_schedule
+        offsets: ti.types.ndarray(dtype=ti.i32, ndim=1),  # [window] linear, nearest first
+        schedule_t: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [K] µs
+        coefficients: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [6 K] a b c d e f
+        cells: ti.types.ndarray(dtype=ti.u32, ndim=1),  # [table]
+        cell_source: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [table], [1] when not tracked
+        ring: ti.types.ndarray(dtype=ti.u64, ndim=1),  # [capacity] cell index << 32 | packed cell
+        ring_source: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [capacity], [1] when not tracked
+        cursors: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [10], see CURSORS
+        suppressed: ti.types.ndarray(dtype=ti.u8, ndim=1),  # [n] out
+        source: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [n] out, [1] when not tracked
+    ):
+        ti.loop_config(serialize=True)
+        for _ in range(1):  # one serial task: what follows lives in registers, not in global temporaries
+            head = ti.cast(cursors[0], ti.i32)
+            pending = ti.cast(cursors[1], ti.i32)
+            entry = ti.cast(cursors[2], ti.i32)
+            index = cursors[3]
+            hits = ti.i64(0)
+            made = ti.i64(0)
+            outside = ti.i64(0)
+            overflow = ti.i64(0)
+            overwritten = ti.i64(0)
+            high_water = ti.cast(cursors[9], ti.i32)
+            entries = schedule_t.shape[0]
+            a = coefficients[6 * entry]
+            b = coefficients[6 * entry + 1]
+            c = coefficients[6 * entry + 2] + 32768
+            d = coefficients[6 * entry + 3]
+            e = coefficients[6 * entry + 4]
+            f = coefficients[6 * entry + 5] + 32768
+            next_t = ti.i64(9223372036854775807)
+            if entry + 1 < entries:
+                next_t = schedule_t[entry + 1]
+            due = ti.u32(0xFFFFFFFF)  # relative t' of the ring's head; nothing pending: never
+            if pending > 0:
+                due = ti.cast(ring[head], ti.u32) >> 2
+            twice = gate_us << 1
+
+            for i in range(first, first + count):
+                at = t[i]
+                now = ti.cast(at - base_us, ti.u32)
+                column = ti.cast(x[i], ti.i32)
+                row = ti.cast(y[i], ti.i32)
+                sign = ti.cast(p[i], ti.u32)
+                here = origin + row * stride + column
+
+                # 1. drain
+                reach = now + gate_us
+                while due <= reach:
+                    packed = ring[head]
+                    cell = ti.cast(packed >> 32, ti.i32)
+                    old = cells[cell]
+                    if (old & 1) != 0 and (old >> 2) + gate_us >= now:
+                        overwritten += 1
+                    cells[cell] = ti.cast(packed, ti.u32)
+                    if ti.static(track_source):
+                        cell_source[cell] = ring_source[head]
+                    head += 1
+                    if head == capacity:
+                        head = 0
+                    pending -= 1
+                    due = ti.u32(0xFFFFFFFF)
+                    if pending > 0:
+                        due = ti.cast(ring[head], ti.u32) >> 2
+
+                # 2. match
+                want = ((now - gate_us) << 2) | ((sign ^ ti.u32(flip)) << 1) | ti.u32(blur | 1)
+                met = -1
+                if ti.static(unrolled > 0):
+                    for k in ti.static(range(unrolled)):
+                        if met < 0:
+                            beside = here + offsets[k]
+                            gap = (cells[beside] | ti.u32(blur)) - want
+                            if ((gap >> 2) | (gap << 30)) <= twice:
+                                met = beside
+                else:
+                    k = 0
+                    while k < offsets.shape[0]:
+                        beside = here + offsets[k]
+                        gap = (cells[beside] | ti.u32(blur)) - want
+                        k += 1
+                        if ((gap >> 2) | (gap << 30)) <= twice:
+                            met = beside
+                            k = offsets.shape[0]
+                if met >= 0:
+                    cells[met] = ti.u32(0)
+                    suppressed[i] = ti.u8(1)
+                    hits += 1
+                    if ti.static(track_source):
+                        source[i] = cell_source[met]
+
+                # 3. predict
+                target = -1
+                if ti.static(by_schedule):
+                    while at >= next_t:
+                        entry += 1
+                        a = coefficients[6 * entry]
+                        b = coefficients[6 * entry + 1]
+                        c = coefficients[6 * entry + 2] + 32768
+                        d = coefficients[6 * entry + 3]
+                        e = coefficients[6 * entry + 4]
+                        f = coefficients[6 * entry + 5] + 32768
+                        next_t = ti.i64(9223372036854775807)
+                        if entry + 1 < entries:
+                            next_t = schedule_t[entry + 1]
+                    wide = ti.cast(column, ti.i64)
+                    tall = ti.cast(row, ti.i64)
+                    ahead_x = ((wide << 16) + a * wide + b * tall + c) >> 16
+                    ahead_y = ((tall << 16) + d * wide + e * tall + f) >> 16
+                    if ahead_x >= 0 and ahead_x < width and ahead_y >= 0 and ahead_y < height:
+                        target = origin + ti.cast(ahead_y, ti.i32) * stride + ti.cast(ahead_x, ti.i32)
+                else:
+                    target = ahead[i]
+                if target < 0:
+                    outside += 1
+                elif pending == capacity:
+                    overflow += 1
+                else:
+                    tail = head + pending
+                    if tail >= capacity:
+                        tail -= capacity
+                    later = now + horizon_us
+                    ring[tail] = (ti.cast(target, ti.u64) << 32) | ti.cast(
+                        (later << 2) | (sign << 1) | ti.u32(1), ti.u64
+                    )
+                    if ti.static(track_source):
+                        ring_source[tail] = index
+                    if pending == 0:
+                        due = later
+                    pending += 1
+                    made += 1
+                    high_water = ti.max(high_water, pending)
+                index += 1
+
+            cursors[0] = head
+            cursors[1] = pending
+            cursors[2] = entry
+            cursors[3] = index
+            cursors[4] += hits
+            cursors[5] += made
+            cursors[6] += outside
+            cursors[7] += overflow
+            cursors[8] += overwritten
+            cursors[9] = high_water
+
+    return run

@@ -1,0 +1,69 @@
+"""Cancel the ego-motion events of an event camera: predict, wait, match, in constant memory.
+
+Names are loaded on first use, so that importing the package costs nothing and prints nothing.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from tiegocancel.errors import ConfigError, InputError, MissingExtraError, TiegoCancelError
+    from tiegocancel.events import EVENT_DTYPE, Events
+    from tiegocancel.files import open_events, open_writer, read_events, write_events
+    from tiegocancel.matching.canceller import Canceller, Decisions
+    from tiegocancel.matching.config import CancelConfig
+    from tiegocancel.motion.schedule import MotionSchedule
+    from tiegocancel.motion.trajectory import RotationTrajectory
+
+__version__ = "0.1.0"
+
+_HOME = {
+    "CancelConfig": "tiegocancel.matching.config",
+    "Canceller": "tiegocancel.matching.canceller",
+    "ConfigError": "tiegocancel.errors",
+    "Decisions": "tiegocancel.matching.canceller",
+    "EVENT_DTYPE": "tiegocancel.events",
+    "Events": "tiegocancel.events",
+    "InputError": "tiegocancel.errors",
+    "MissingExtraError": "tiegocancel.errors",
+    "MotionSchedule": "tiegocancel.motion.schedule",
+    "RotationTrajectory": "tiegocancel.motion.trajectory",
+    "TiegoCancelError": "tiegocancel.errors",
+    "open_events": "tiegocancel.files",
+    "open_writer": "tiegocancel.files",
+    "read_events": "tiegocancel.files",
+    "write_events": "tiegocancel.files",
+}
+
+__all__ = [
+    "EVENT_DTYPE",
+    "CancelConfig",
+    "Canceller",
+    "ConfigError",
+    "Decisions",
+    "Events",
+    "InputError",
+    "MissingExtraError",
+    "MotionSchedule",
+    "RotationTrajectory",
+    "TiegoCancelError",
+    "__version__",
+    "open_events",
+    "open_writer",
+    "read_events",
+    "write_events",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'tiegocancel' has no attribute {name!r}")
+    value = getattr(importlib.import_module(_HOME[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)
