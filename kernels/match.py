@@ -57,8 +57,10 @@ def _kernel(polarity, unrolled, by_schedule, track_source):
         offsets: ti.types.ndarray(dtype=ti.i32, ndim=1),  # [window] linear, nearest first
         schedule_t: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [K] µs
         coefficients: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [6 K] a b c d e f
-        cells: ti.types.ndarray(dtype=ti.u32, ndim=1),  # [table]
-        cell_source: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [table], [1] when not tracked
+        cells: ti.types.ndarray(
+            dtype=ti.u32, ndim=1
+        ),  # [table + 1], the last one a spare that takes the write of an event without a match
+        cell_source: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [table + 1], the spare holds −1; [1] when not tracked
         ring: ti.types.ndarray(dtype=ti.u64, ndim=1),  # [capacity] cell index << 32 | packed cell
         ring_source: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [capacity], [1] when not tracked
         cursors: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [10], see CURSORS
@@ -69,28 +71,22 @@ def _kernel(polarity, unrolled, by_schedule, track_source):
         for _ in range(1):  # one serial task: what follows lives in registers, not in global temporaries
             head = ti.cast(cursors[0], ti.i32)
             pending = ti.cast(cursors[1], ti.i32)
-            entry = ti.cast(cursors[2], ti.i32)
+            entry = ti.cast(cursors[2], ti.i32) - 1  # the first event loads the entry that was in force
             index = cursors[3]
-            hits = ti.i64(0)
-            made = ti.i64(0)
+            hits = ti.u32(0)
             outside = ti.i64(0)
             overflow = ti.i64(0)
-            overwritten = ti.i64(0)
+            overwritten = ti.u32(0)
             high_water = ti.cast(cursors[9], ti.i32)
             entries = schedule_t.shape[0]
-            a = coefficients[6 * entry]
-            b = coefficients[6 * entry + 1]
-            c = coefficients[6 * entry + 2] + 32768
-            d = coefficients[6 * entry + 3]
-            e = coefficients[6 * entry + 4]
-            f = coefficients[6 * entry + 5] + 32768
-            next_t = ti.i64(9223372036854775807)
-            if entry + 1 < entries:
-                next_t = schedule_t[entry + 1]
+            next_t = ti.i64(-9223372036854775808)
+            a, b, c = ti.i64(0), ti.i64(0), ti.i64(0)
+            d, e, f = ti.i64(0), ti.i64(0), ti.i64(0)
             due = ti.u32(0xFFFFFFFF)  # relative t' of the ring's head; nothing pending: never
             if pending > 0:
                 due = ti.cast(ring[head], ti.u32) >> 2
             twice = gate_us << 1
+            spare = cells.shape[0] - 1
 
             for i in range(first, first + count):
                 at = t[i]
@@ -106,8 +102,7 @@ def _kernel(polarity, unrolled, by_schedule, track_source):
                     packed = ring[head]
                     cell = ti.cast(packed >> 32, ti.i32)
                     old = cells[cell]
-                    if (old & 1) != 0 and (old >> 2) + gate_us >= now:
-                        overwritten += 1
+                    overwritten += ti.select((old >> 2) + gate_us >= now, old & 1, ti.u32(0))
                     cells[cell] = ti.cast(packed, ti.u32)
                     if ti.static(track_source):
                         cell_source[cell] = ring_source[head]
@@ -121,14 +116,16 @@ def _kernel(polarity, unrolled, by_schedule, track_source):
 
                 # 2. match
                 want = ((now - gate_us) << 2) | ((sign ^ ti.u32(flip)) << 1) | ti.u32(blur | 1)
-                met = -1
+                met = spare
+                searching = True  # a constant on each path, so that the unrolled search ends in one jump
                 if ti.static(unrolled > 0):
                     for k in ti.static(range(unrolled)):
-                        if met < 0:
+                        if searching:
                             beside = here + offsets[k]
                             gap = (cells[beside] | ti.u32(blur)) - want
                             if ((gap >> 2) | (gap << 30)) <= twice:
                                 met = beside
+                                searching = False
                 else:
                     k = 0
                     while k < offsets.shape[0]:
@@ -138,12 +135,11 @@ def _kernel(polarity, unrolled, by_schedule, track_source):
                         if ((gap >> 2) | (gap << 30)) <= twice:
                             met = beside
                             k = offsets.shape[0]
-                if met >= 0:
-                    cells[met] = ti.u32(0)
-                    suppressed[i] = ti.u8(1)
-                    hits += 1
-                    if ti.static(track_source):
-                        source[i] = cell_source[met]
+                cells[met] = ti.u32(0)
+                suppressed[i] = ti.cast(met != spare, ti.u8)
+                hits += ti.cast(met != spare, ti.u32)
+                if ti.static(track_source):
+                    source[i] = cell_source[met]
 
                 # 3. predict
                 target = -1
@@ -184,16 +180,15 @@ def _kernel(polarity, unrolled, by_schedule, track_source):
                     if pending == 0:
                         due = later
                     pending += 1
-                    made += 1
                     high_water = ti.max(high_water, pending)
                 index += 1
 
             cursors[0] = head
             cursors[1] = pending
-            cursors[2] = entry
+            cursors[2] = ti.max(entry, cursors[2])
             cursors[3] = index
             cursors[4] += hits
-            cursors[5] += made
+            cursors[5] += count - outside - overflow
             cursors[6] += outside
             cursors[7] += overflow
             cursors[8] += overwritten

@@ -41,7 +41,8 @@ def fill(cls: type[T], table: dict[str, Any], where: str) -> T:
             near = difflib.get_close_matches(key, fields, n=1, cutoff=0.4)
             hint = f"; did you mean {near[0]!r}?" if near else f"; known keys: {', '.join(fields)}"
             raise ConfigError(f"{where}: unknown key {key!r}{hint}")
-        values[key] = _convert(hints[key], value, f"{where} {key}")
+        place = f"{where} [{key}]" if isinstance(value, dict) else f"{where} {key}"
+        values[key] = _convert(hints[key], value, place)
     try:
         return cls(**values)
     except (TypeError, ValueError) as error:

@@ -145,7 +145,7 @@ class Events:
         """Build from columns that were validated before: any subset in order is valid too."""
         part = object.__new__(Events)
         for name in ("t", "x", "y", "p", "label"):
-            column = getattr(self, name)
+            column: NDArray[Any] | None = getattr(self, name)
             if column is not None:
                 column = np.ascontiguousarray(column[rows])
                 column.flags.writeable = False
@@ -190,6 +190,6 @@ def _column(name: str, values: ArrayLike, dtype: type, low: int, high: int) -> N
     if wrong.any():
         row = int(np.argmax(wrong))
         raise ValueError(f"{name} must be from {low} to {high}: row {row} has {given[row]}")
-    column = np.ascontiguousarray(given, dtype=dtype).view()
+    column: NDArray[Any] = np.ascontiguousarray(given, dtype=dtype).view()
     column.flags.writeable = False
     return column

@@ -84,9 +84,9 @@ class Canceller:
         table = (self.height + 2 * border) * self._stride + border
         if table >= 1 << 31:
             raise ValueError(f"a table of {table} cells for {width}×{height} px is beyond 2^31")
-        tracked = table if track_source else 1
+        tracked = table + 1 if track_source else 1
         schedule = motion if isinstance(motion, MotionSchedule) else MotionSchedule.still()
-        self._cells = np.zeros(table, np.uint32)
+        self._cells = np.zeros(table + 1, np.uint32)
         self._ring = np.zeros(config.ring_capacity, np.uint64)
         self._cursors = np.zeros(10, np.int64)
         self._base_us: int | None = None
@@ -104,7 +104,7 @@ class Canceller:
             "schedule_t": np.array(schedule.t_us),
             "coefficients": np.array(schedule.coefficients).ravel(),
             "cells": self._cells,
-            "cell_source": np.zeros(tracked, np.int64),
+            "cell_source": np.full(tracked, -1, np.int64),
             "ring": self._ring,
             "ring_source": np.zeros(config.ring_capacity if track_source else 1, np.int64),
             "cursors": self._cursors,
@@ -122,6 +122,11 @@ class Canceller:
         """Number of predictions in the ring."""
         return int(self._cursors[1])
 
+    def prepare(self) -> None:
+        """Compile the kernel now instead of at the first event; it decides nothing."""
+        one = Events([0], [0], [0], [0], self.width, self.height)  # type: ignore[arg-type]
+        self._launch(one, 0, 0, self._unused, np.zeros(1, np.uint8), np.zeros(1, np.int64), base_us=0)
+
     def process(self, events: Events) -> Decisions:
         """Decide every event of a chunk; chunks may be cut anywhere and may be empty.
 
@@ -132,13 +137,13 @@ class Canceller:
                 f"events of {events.width}×{events.height} px do not fit a canceller of {self.width}×{self.height} px"
             )
         count = len(events)
-        suppressed = np.zeros(count, np.uint8)
-        source = np.full(count if self.track_source else 1, -1, np.int64)
+        suppressed = np.empty(count, np.uint8)
+        source = np.empty(count if self.track_source else 1, np.int64)
         if count:
             self._check_order(events)
             ahead = self._ahead(events) if isinstance(self.motion, RotationTrajectory) else self._unused
-            for first, last in self._launches(events.t):
-                self._launch(events, first, last, ahead, suppressed, source)
+            for first, last, base_us in self._launches(events.t):
+                self._launch(events, first, last, ahead, suppressed, source, base_us=base_us)
         return Decisions(suppressed=suppressed.view(np.bool_), source=source if self.track_source else None)
 
     def _check_order(self, events: Events) -> None:
@@ -147,16 +152,19 @@ class Canceller:
             raise ValueError(f"the chunk begins at {events.t[0]} µs, before the last event at {self._last_us} µs")
         self._last_us = int(events.t[-1])
 
-    def _launches(self, t: NDArray[np.int64]) -> Iterator[tuple[int, int]]:
-        """Cut a chunk where the relative times would leave their bits, moving the base in between."""
+    def _launches(self, t: NDArray[np.int64]) -> Iterator[tuple[int, int, int]]:
+        """Cut a chunk where the relative times would leave their bits, moving the base in between.
+
+        Yield first and last row of each launch, and the base of its times.
+        """
         first = 0
         while first < len(t):
-            if self._base_us is None or int(t[first]) >= self._base_us + _LAUNCH_SPAN_US:
-                self._move_base(int(t[first]))
-            assert self._base_us is not None
-            limit = self._base_us + _LAUNCH_SPAN_US
+            base_us = self._base_us
+            if base_us is None or int(t[first]) >= base_us + _LAUNCH_SPAN_US:
+                base_us = self._move_base(int(t[first]))
+            limit = base_us + _LAUNCH_SPAN_US
             last = len(t) if int(t[-1]) < limit else int(np.searchsorted(t, limit, side="left"))
-            yield first, last
+            yield first, last, base_us
             first = last
 
     def _launch(
@@ -167,7 +175,10 @@ class Canceller:
         ahead: NDArray[np.int32],
         suppressed: NDArray[np.uint8],
         source: NDArray[np.int64],
+        *,
+        base_us: int,
     ) -> None:
+        """Hand rows ``first`` to ``last`` to the kernel."""
         from tiegocancel.kernels.match import cancel
 
         cancel(
@@ -179,7 +190,7 @@ class Canceller:
                 **self._arguments,
                 "count": last - first,
                 "first": first,
-                "base_us": self._base_us,
+                "base_us": base_us,
                 "t": events.t,
                 "x": events.x,
                 "y": events.y,
@@ -197,8 +208,8 @@ class Canceller:
         inside = (ahead_x >= 0) & (ahead_x < self.width) & (ahead_y >= 0) & (ahead_y < self.height)
         return np.where(inside, self._origin + ahead_y * self._stride + ahead_x, -1).astype(np.int32)
 
-    def _move_base(self, now_us: int) -> None:
-        """Count relative times from just before ``now_us`` and drop every prediction that no event can meet again.
+    def _move_base(self, now_us: int) -> int:
+        """Count relative times from just before ``now_us`` on, drop every prediction that is dead; return the base.
 
         A prediction is dead once ``t' + ε_t < now``: times never decrease. Dropping it before its bits wrap is what
         keeps an alias from ever matching, and it changes no decision and no counter.
@@ -213,6 +224,7 @@ class Canceller:
             self._cells[alive] -= np.uint32(min(shift, (1 << 30) - 1)) << np.uint32(2)
             self._rebase_ring(shift)
         self._base_us = base
+        return base
 
     def _rebase_ring(self, shift: int) -> None:
         """Pop the dead at the head (predictions fall due in order) and shift the rest."""

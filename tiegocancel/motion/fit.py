@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -69,10 +69,11 @@ class RotationFit:
     notes: tuple[str, ...]
 
     def trajectory(self) -> RotationTrajectory:
-        """Return the rotation for all time, with source ``fit``."""
-        return RotationTrajectory.constant(
+        """Return the rotation for all time, with source ``fit`` and the notes of the fit."""
+        constant = RotationTrajectory.constant(
             center_px=self.center_px, omega_rad_s=self.omega_rad_s, t_us=self.window_us[0], source="fit"
         )
+        return replace(constant, notes=tuple(f"fit: {note}" for note in self.notes))
 
 
 def fit_rotation(events: Events, *, seed: int = 0, config: FitConfig | None = None) -> RotationFit:

@@ -1,0 +1,183 @@
+"""The command line as a user meets it: files on disk, numbers on stdout, talk on stderr, one line for an error."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tiegocancel import Events, read_events, write_events
+from tiegocancel.cli import main
+
+CENTER, OMEGA = (60.0, 50.0), 20.0
+MOTION = f"{CENTER[0]},{CENTER[1]},{OMEGA}"
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Thirty turning markers over 60 ms, as NPZ."""
+    rng = np.random.default_rng(5)
+    t = np.arange(0, 60_000, 100)
+    radius, angle = 8 + 35 * rng.random(30), 2 * np.pi * rng.random(30)
+    turned = angle + OMEGA * t[:, None] * 1e-6
+    x = np.floor(CENTER[0] + radius * np.cos(turned) + 0.5).astype(int)
+    y = np.floor(CENTER[1] + radius * np.sin(turned) + 0.5).astype(int)
+    fresh = np.ones_like(x, bool)
+    fresh[1:] = (np.diff(x, axis=0) != 0) | (np.diff(y, axis=0) != 0)
+    n = int(fresh.sum())
+    path = tmp_path_factory.mktemp("run") / "ring.npz"
+    write_events(path, Events(np.repeat(t, 30)[fresh.ravel()], x[fresh], y[fresh], np.ones(n, int), 128, 96))
+    return path
+
+
+def run_json(capsys: pytest.CaptureFixture[str], *arguments: object) -> dict[str, object]:
+    assert main([str(a) for a in arguments]) == 0
+    captured = capsys.readouterr()
+    assert len(captured.out.splitlines()) == 1
+    numbers: dict[str, object] = json.loads(captured.out)
+    return numbers
+
+
+def test_run_writes_residual_report_figures_and_manifest(
+    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "a" / "b"
+    numbers = run_json(capsys, "run", source, "--motion", MOTION, "--out", out, "--json")
+    keys = {
+        "events", "suppressed", "cancellation_ratio", "cancellation_ratio_pairs", "controls", "motion", "counters",
+        "selectivity", "seconds", "events_per_second", "regions", "verdict", "state",
+    }  # fmt: skip
+    assert keys <= set(numbers)
+    assert set(numbers["controls"]) == {"zero_motion", "reversed_motion", "time_shuffled"}  # type: ignore[call-overload]
+    assert numbers["motion"]["center_px"] == list(CENTER)  # type: ignore[index]
+    residual = read_events(out / "residual.npz")
+    assert len(residual) == numbers["events"] - numbers["suppressed"]  # type: ignore[operator]
+    assert (residual.width, residual.height) == (128, 96)
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "data:image/png;base64," in page
+    assert not re.search(r"(src|href)=.?https?:", page)
+    assert "$" not in re.sub(r"base64,[^\"]*", "", page)
+    manifest = json.loads((out / "manifest.json").read_text(encoding="utf-8"))
+    assert manifest["results"] == numbers
+    assert manifest["inputs"][0]["bytes"] == source.stat().st_size
+    assert {"report.html", "residual.npz", "before_after.png", "controls.png"} <= set(manifest["outputs"])
+
+
+def test_flags_override_the_file_which_overrides_the_defaults(
+    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config = tmp_path / "run.toml"
+    config.write_text(
+        f'[cancel]\nhorizon_us = 9000\ntolerance_px = 1.0\n[motion]\nsource = "{MOTION}"\n'
+        "[output]\nfigures = false\n[report]\ncontrols = false\n",
+        encoding="utf-8",
+    )
+    out = tmp_path / "out"
+    run_json(capsys, "run", source, "--config", config, "--horizon-us", 7000, "--out", out, "--json")
+    settings = json.loads((out / "manifest.json").read_text(encoding="utf-8"))["settings"]
+    assert settings["cancel"] == {
+        "horizon_us": 7000, "tolerance_us": 1000, "tolerance_px": 1.0, "polarity": "opposite", "ring_capacity": 65_536,
+    }  # fmt: skip
+    assert not list(out.glob("*.png"))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "message"),
+    [
+        (["run", "absent.npz"], 1, r"absent\.npz: no such file"),
+        (["run", "{source}", "--motion", "1,2"], 2, r"--motion '1,2'"),
+        (["run", "{source}", "--motion", "absent.csv"], 2, r"absent\.csv"),
+        (
+            ["run", "{source}", "--motion", MOTION, "--horizon-us", "-4"],
+            2,
+            r"horizon_us must be an integer from 0 .* not -4",
+        ),
+        (["run", "{source}", "--motion", MOTION, "--ring-capacity", "0"], 2, r"ring_capacity .* not 0"),
+        (["run", "{source}", "--motion", MOTION, "--residual", "xyz"], 2, r"xyz"),
+        (["run", "{source}", "--motion", MOTION, "--config", "absent.toml"], 2, r"absent\.toml"),
+        (["run", "{source}", "--motion", MOTION, "--out", "{source}"], 2, r"--out"),
+    ],
+)
+def test_bad_input_is_one_clear_line(
+    arguments: list[str],
+    code: int,
+    message: str,
+    source: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main([argument.format(source=source) for argument in arguments]) == code
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    lines = [line for line in captured.err.splitlines() if not line.startswith("note:")]
+    assert len(lines) == 1
+    assert re.search(message, lines[0])
+
+
+def test_a_torn_recording_leaves_what_came_before_on_disk(
+    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    whole = tmp_path / "whole.raw"
+    write_events(whole, read_events(source))
+    torn = tmp_path / "torn.raw"
+    torn.write_bytes(whole.read_bytes()[:-1001])
+    out = tmp_path / "out"
+    arguments = ["run", str(torn), "--motion", MOTION, "--out", str(out), "--no-figures"]
+    assert main(arguments) == 1
+    captured = capsys.readouterr()
+    assert re.search(r"torn\.raw: byte \d+", captured.err)
+    manifest = json.loads((out / "manifest.json").read_text(encoding="utf-8"))
+    assert manifest["results"]["fault"]
+    kept = len(read_events(out / "residual.npz"))
+    assert kept == manifest["results"]["residual"] > 0
+    assert main([*arguments, "--keep-going"]) == 0
+
+
+def test_a_sensor_declared_too_small_names_the_row_and_the_value(
+    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["run", str(source), "--motion", MOTION, "--width", "64", "--no-figures", "--out", str(tmp_path)]
+    assert main(arguments) == 1
+    assert re.search(r"ring\.npz: row \d+: x is \d+, expected 0 to 63", capsys.readouterr().err)
+
+
+def test_an_empty_recording_is_said_to_be_empty(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "empty.npz"
+    write_events(path, Events.empty(8, 8))
+    assert main(["run", str(path), "--motion", "4,4,1", "--out", str(tmp_path / "out")]) == 1
+    assert "holds no events" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("residual", ["npz", "npy", "csv", "evt2"])
+def test_residual_is_written_in_the_format_asked_for(
+    residual: str, source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    numbers = run_json(
+        capsys, "run", source, "--motion", MOTION, "--residual", residual, "--no-figures", "--out", out, "--json"
+    )
+    path = out / {"evt2": "residual.raw"}.get(residual, f"residual.{residual}")
+    assert len(read_events(path, width=128, height=96)) == numbers["residual"]
+
+
+def test_demo_is_selective_and_fills_its_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "demo"
+    numbers = run_json(capsys, "demo", "--duration", "0.12", "--no-figures", "--out", out, "--json")
+    assert numbers["verdict"]["grade"] == "selective"  # type: ignore[index]
+    assert numbers["selectivity"]["j"] > 0.6  # type: ignore[index]
+    assert numbers["motion"]["rim_displacement_px"] > 30  # type: ignore[index]
+    assert read_events(out / "residual.npz").label is not None
+
+
+def test_demo_takes_a_scene_from_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    config = tmp_path / "small.toml"
+    config.write_text("[scene]\nwidth = 160\nheight = 90\n[cancel]\nhorizon_us = 30000\n", encoding="utf-8")
+    numbers = run_json(
+        capsys, "demo", "--duration", "0.08", "--config", config, "--out", tmp_path / "o", "--no-figures", "--json"
+    )
+    assert numbers["sensor"] == {"width": 160, "height": 90}

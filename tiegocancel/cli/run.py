@@ -1,0 +1,86 @@
+"""``tiegocancel run SOURCE``: cancel a recording, with controls, figures and a report."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tiegocancel.cli.options import add_reading_options
+from tiegocancel.cli.settings import add_cancel_options, add_output_options, settings_from
+
+if TYPE_CHECKING:
+    from tiegocancel.events import Events
+    from tiegocancel.files import EventReader
+
+__all__ = ["add_parser", "run"]
+
+SAMPLE_EVENTS = 1 << 22
+"""``--motion fit`` looks at this many events from the beginning of the recording."""
+
+
+def add_parser(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the verb."""
+    parser = verbs.add_parser(
+        "run",
+        help="cancel the ego-motion of a recording",
+        description="Cancel the ego-motion events of a recording; write what remains, a report and a manifest.",
+    )
+    parser.add_argument("source", type=Path, metavar="SOURCE", help="recording: npz, npy, csv, txt, raw, dat, aedat, …")
+    parser.add_argument(
+        "--motion", metavar="M", help="fit (default), CX,CY,OMEGA in px and rad/s, or a CSV of a tracker"
+    )
+    add_cancel_options(parser)
+    add_reading_options(parser)
+    add_output_options(parser)
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the verb."""
+    settings = settings_from(args)
+    from tiegocancel.cli.session import Session
+    from tiegocancel.files import open_events
+    from tiegocancel.motion.source import trajectory_from
+
+    with open_events(args.source, **asdict(settings.read), format=args.format) as reader:
+        trajectory, fit = trajectory_from(
+            settings.motion.source, sample=lambda: _sample(reader), width=reader.width, height=reader.height
+        )
+        session = Session(
+            args, settings, title=f"{args.source.name}", inputs=_inputs(args.source, settings.motion.source)
+        )
+        return session.run(
+            reader,
+            trajectory,
+            width=reader.width,
+            height=reader.height,
+            labelled=reader.labelled,
+            fit=fit,
+            notes=reader.notes,
+        )
+
+
+def _sample(reader: EventReader) -> Events:
+    """Read the events that the fit may look at; a fault further on is left to the run itself."""
+    from tiegocancel.errors import TiegoCancelError
+    from tiegocancel.events import Events
+
+    parts = [Events.empty(reader.width, reader.height)]
+    count = 0
+    try:
+        for chunk in reader:
+            parts.append(chunk)
+            count += len(chunk)
+            if count >= SAMPLE_EVENTS:
+                break
+    except TiegoCancelError:
+        if not count:
+            raise
+    return Events.concatenate(parts)[:SAMPLE_EVENTS]
+
+
+def _inputs(source: Path, motion: str) -> list[Path]:
+    """Name the files whose checksums belong into the manifest."""
+    return [path for path in (source, Path(motion)) if path.is_file()]

@@ -1,0 +1,92 @@
+"""Follow each event until its fate is final: whether it was suppressed, whether its prediction was used."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tiegocancel.events import Events
+from tiegocancel.matching.canceller import Decisions
+from tiegocancel.matching.config import CancelConfig
+from tiegocancel.motion.schedule import MotionSchedule
+from tiegocancel.motion.trajectory import RotationTrajectory
+
+__all__ = ["Ledger", "Matches", "Settled"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Settled:
+    """Events whose fate is final: ``suppressed`` bool[n], ``used`` bool[n] (their prediction suppressed another)."""
+
+    events: Events
+    suppressed: NDArray[np.bool_]
+    used: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Matches:
+    """Residuals of the matches of one chunk, real event minus prediction.
+
+    ``t_us`` int64[m] time of the suppressed event; ``dx`` ``dy`` int64[m] px; ``late_us`` int64[m].
+    """
+
+    t_us: NDArray[np.int64]
+    dx: NDArray[np.int64]
+    dy: NDArray[np.int64]
+    late_us: NDArray[np.int64]
+
+
+class Ledger:
+    """Keep the events of the last ``Δt + ε_t``: only their predictions can still be used."""
+
+    def __init__(self, config: CancelConfig, motion: MotionSchedule | RotationTrajectory) -> None:
+        self._config, self._motion = config, motion
+        self._held: Settled | None = None
+        self._first = 0  # index in the stream of the first event held
+
+    def add(self, events: Events, decisions: Decisions) -> tuple[Settled, Matches]:
+        """Take a chunk with its decisions (``source`` tracked); return what became final, and the chunk's matches."""
+        if decisions.source is None:
+            raise ValueError("the ledger needs decisions with source: Canceller(..., track_source=True)")
+        offset = 0
+        unused = np.zeros(len(events), np.bool_)
+        held = Settled(events, decisions.suppressed, unused)
+        if self._held is not None:
+            offset = len(self._held.events)
+            held = Settled(
+                Events.concatenate([self._held.events, events]),
+                np.concatenate([self._held.suppressed, decisions.suppressed]),
+                np.concatenate([self._held.used, unused]),
+            )
+        met = np.flatnonzero(decisions.suppressed)
+        made = decisions.source[met] - self._first
+        held.used[made] = True
+        matches = self._matches(held.events, met + offset, made)
+        horizon = self._config.horizon_us + self._config.tolerance_us
+        done = 0
+        if len(held.events):
+            done = int(np.searchsorted(held.events.t, held.events.t[-1] - horizon, side="left"))
+        self._held = Settled(held.events[done:], held.suppressed[done:].copy(), held.used[done:].copy())
+        self._first += done
+        return Settled(held.events[:done], held.suppressed[:done], held.used[:done]), matches
+
+    def close(self) -> Settled | None:
+        """Return the events that were still open, final now because the stream has ended."""
+        held, self._held = self._held, None
+        return held
+
+    def _matches(self, events: Events, met: NDArray[np.int64], made: NDArray[np.int64]) -> Matches:
+        """Compare each suppressed event with the prediction that it met."""
+        t, x, y = events.t[made], events.x[made], events.y[made]
+        if isinstance(self._motion, RotationTrajectory):
+            ahead_x, ahead_y = self._motion.predict(t, x, y, self._config.horizon_us)
+        else:
+            ahead_x, ahead_y = self._motion.predict(t, x, y)
+        return Matches(
+            t_us=events.t[met],
+            dx=events.x[met].astype(np.int64) - ahead_x,
+            dy=events.y[met].astype(np.int64) - ahead_y,
+            late_us=events.t[met] - (t + self._config.horizon_us),
+        )

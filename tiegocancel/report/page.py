@@ -1,0 +1,186 @@
+"""Write one self-contained HTML page that leads with the numbers and their controls."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Sequence
+from html import escape
+from importlib.resources import files
+from pathlib import Path
+from string import Template
+from typing import Any
+
+from tiegocancel.report.figures import Drawing
+from tiegocancel.study.result import RunResult
+from tiegocancel.study.verdict import Verdict
+
+__all__ = ["write_page"]
+
+_CONTROL_ROWS = (
+    ("zero_motion", "zero motion", "predict “same place”: what a wide gate and slow motion give for nothing"),
+    ("reversed_motion", "reversed motion", "turn the other way: wrong everywhere but at the centre"),
+    ("time_shuffled", "times shuffled", "true motion on pixels permuted against their times: chance at this density"),
+)
+
+
+def write_page(
+    path: Path, result: RunResult, verdict: Verdict, drawings: list[Drawing], *, title: str, notes: Sequence[str] = ()
+) -> None:
+    """Write the report of ``result`` to ``path``; figures are embedded, nothing is loaded from elsewhere."""
+    numbers = result.to_json()
+    tiles = _tiles(result, numbers)
+    template = Template(files("tiegocancel.report").joinpath("page.html").read_text(encoding="utf-8"))
+    path.write_text(
+        template.substitute(
+            title=escape(title),
+            subtitle=escape(_subtitle(result)),
+            grade=verdict.grade,
+            headline=escape(verdict.headline),
+            reasons="".join(f"<p>{escape(reason)}</p>" for reason in verdict.reasons),
+            tiles="".join(_tile(*tile) for tile in tiles),
+            columns=3 if len(tiles) % 4 and len(tiles) % 3 == 0 else 4,
+            controls=_control_table(result, numbers),
+            figures="".join(_figure(drawing) for drawing in drawings),
+            details="".join(_details(heading, rows) for heading, rows in _detail_tables(result, numbers)),
+            remarks=_remarks(result, notes),
+        ),
+        encoding="utf-8",
+    )
+
+
+def _subtitle(result: RunResult) -> str:
+    rate = result.counters.events / result.duration_s / 1e6 if result.duration_s else 0.0
+    return (
+        f"{result.counters.events:,} events of {result.width}×{result.height} px in {result.duration_s:.3f} s "
+        f"({rate:.2f} Mev/s), horizon {result.settings.cancel.horizon_us / 1000:g} ms"
+    )
+
+
+def _tiles(result: RunResult, numbers: dict[str, Any]) -> list[tuple[str, str, str]]:
+    """Return value, name and remark of the numbers that lead the page."""
+    disc = numbers["regions"]["disc"]
+    tiles = [
+        (f"{numbers['cancellation_ratio']:.1%}", "cancellation ratio", "events that need not be sent"),
+        (f"{disc['cancellation_ratio']:.1%}", "on the disc", f"radius {result.region.radius_px:g} px"),
+    ]
+    if "zero_motion" in disc["controls"]:
+        gap = disc["cancellation_ratio"] - disc["controls"]["zero_motion"]
+        tiles.append((f"{100 * gap:+.1f} points", "beyond zero motion", "on the disc"))
+    selectivity = numbers["selectivity"]
+    if selectivity is not None:
+        tiles.append((f"{selectivity['mover']:.1%}", "of the mover lost", "suppressed wrongly"))
+        tiles.append((f"{selectivity['j']:.2f}", "selectivity J", "ego − mover share"))
+    if result.duration_s:
+        after = (numbers["events"] - numbers["suppressed"]) / result.duration_s / 1e6
+        tiles.append(
+            (f"{after:.2f} Mev/s", "still sent", f"of {numbers['events'] / result.duration_s / 1e6:.2f} Mev/s")
+        )
+    tiles.append((f"{numbers['state']['kib']:,.0f} KiB", "of state", "ring and table, constant"))
+    tiles.append((f"{numbers['events_per_second'] / 1e6:.1f} Mev/s", "decided", "on this machine, one thread"))
+    return tiles
+
+
+def _tile(value: str, name: str, remark: str) -> str:
+    return (
+        f'<div class="tile"><div class="value">{escape(value)}</div><div class="name">{escape(name)}</div>'
+        f'<div class="remark">{escape(remark)}</div></div>'
+    )
+
+
+def _control_table(result: RunResult, numbers: dict[str, Any]) -> str:
+    """Show the ratios of the run and of its controls side by side."""
+    labelled = numbers["selectivity"] is not None
+    heads = (
+        ["", "all events", "disc", "background"] + (["ego", "mover", "noise", "J"] if labelled else []) + ["meaning"]
+    )
+    rows = [_ratio_row("motion given", "what the canceller was told", numbers["cancellation_ratio"], None, numbers)]
+    for key, name, meaning in _CONTROL_ROWS:
+        if key in numbers["controls"]:
+            rows.append(_ratio_row(name, meaning, numbers["controls"][key], key, numbers))
+    head = "".join(f"<th>{escape(text)}</th>" for text in heads)
+    return f"<table class='ratios'><thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
+
+
+def _ratio_row(name: str, meaning: str, whole: float, control: str | None, numbers: dict[str, Any]) -> str:
+    regions = [numbers["regions"][region] for region in ("disc", "background")]
+    shares = [whole] + [region["controls"][control] if control else region["cancellation_ratio"] for region in regions]
+    cells = [f"{share:.1%}" for share in shares]
+    if numbers["selectivity"] is not None:
+        selectivity = numbers["selectivity_of_controls"][control] if control else numbers["selectivity"]
+        cells += [f"{selectivity[cause]:.1%}" for cause in ("ego", "mover", "noise")] + [f"{selectivity['j']:.2f}"]
+    body = "".join(f"<td class='number'>{cell}</td>" for cell in cells)
+    lead = " class='lead'" if control is None else ""
+    return f"<tr{lead}><th>{escape(name)}</th>{body}<td class='meaning'>{escape(meaning)}</td></tr>"
+
+
+def _detail_tables(result: RunResult, numbers: dict[str, Any]) -> list[tuple[str, list[tuple[str, str]]]]:
+    """Return the tables at the end of the page: operating point, motion, residual, counters."""
+    cancel, motion, found = result.settings.cancel, numbers["motion"], numbers["displacement"]
+    ratio = numbers["signal_to_noise"]
+    density = numbers["regions"]
+    point = [
+        ("horizon Δt", f"{cancel.horizon_us:,} µs"),
+        ("temporal gate ε_t", f"±{cancel.tolerance_us:,} µs"),
+        ("spatial gate ε_xy", f"{cancel.tolerance_px:g} px"),
+        ("polarity", cancel.polarity),
+        ("ring capacity", f"{cancel.ring_capacity:,} predictions"),
+        ("motion path", result.settings.motion.path),
+    ]
+    turning = [
+        ("centre", f"({motion['center_px'][0]:.1f}, {motion['center_px'][1]:.1f}) px"),
+        ("angular velocity ω", f"{motion['omega_rad_s']:+.4f} rad/s"),
+        ("source", motion["source"]),
+        ("rim displacement within Δt", f"{motion['rim_displacement_px']:.1f} px"),
+    ]
+    rest = [
+        ("CR (causal)", f"{numbers['cancellation_ratio']:.2%}"),
+        ("CR_pairs (thesis, offline)", f"{numbers['cancellation_ratio_pairs']:.2%}"),
+        (
+            "warm-up left out",
+            f"{numbers['warm_up']['us'] / 1000:g} ms, {numbers['warm_up']['events_left_out']:,} events",
+        ),
+        *(
+            (
+                f"{name}, events a pixel",
+                f"{density[name]['events_per_px']:.3g} → {density[name]['residual_per_px']:.3g}",
+            )
+            for name in ("disc", "background")
+        ),
+        ("(N_disc − N_bg)/N_bg, densities", f"{_optional(ratio['before'])} → {_optional(ratio['after'])}"),
+    ]
+    if found["matches"]:
+        rest.append(("match distance, mean / 95 %", f"{found['mean_px']:.2f} / {found['p95_px']:.2f} px"))
+        rest.append(("mean residual (dx, dy)", f"({found['mean_dx_px']:+.2f}, {found['mean_dy_px']:+.2f}) px"))
+        rest.append(("mean lateness", f"{found['mean_late_us']:+.0f} µs"))
+    counts = [(name.replace("_", " "), f"{value:,}") for name, value in numbers["counters"].items()]
+    return [("Operating point", point), ("Motion", turning), ("Residual", rest), ("Counters", counts)]
+
+
+def _details(heading: str, rows: list[tuple[str, str]]) -> str:
+    body = "".join(f"<tr><th>{escape(name)}</th><td>{escape(value)}</td></tr>" for name, value in rows)
+    return f"<section><h3>{escape(heading)}</h3><table>{body}</table></section>"
+
+
+def _optional(value: float | None) -> str:
+    return "–" if value is None else f"{value:.2f}"
+
+
+def _figure(drawing: Drawing) -> str:
+    data = base64.b64encode(drawing.path.read_bytes()).decode("ascii")
+    return (
+        f'<figure><h2>{escape(drawing.title)}</h2><img alt="{escape(drawing.title)}" '
+        f'src="data:image/png;base64,{data}"><figcaption>{escape(drawing.caption)}</figcaption></figure>'
+    )
+
+
+def _remarks(result: RunResult, notes: Sequence[str]) -> str:
+    """List what went wrong or was assumed; a fault in the input comes first."""
+    lines = ([f"The input ended early: {result.fault}"] if result.fault else []) + list(result.notes)
+    lines += [*notes, *result.trajectory.notes]
+    if not lines:
+        return ""
+    return (
+        "<section class='remarks'><h2>Remarks</h2><ul>"
+        + "".join(f"<li>{escape(line)}</li>" for line in lines)
+        + "</ul></section>"
+    )

@@ -1,0 +1,128 @@
+"""Draw the numbers of a run: controls, radial profile, match residuals, rate."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import PercentFormatter
+
+from tiegocancel.report import style
+from tiegocancel.study.result import RunResult
+
+__all__ = ["controls", "displacement", "radial_profile", "rate"]
+
+_NAMES = {"zero_motion": "zero motion", "reversed_motion": "reversed", "time_shuffled": "times shuffled"}
+
+
+def controls(result: RunResult) -> Figure | None:
+    """Draw the share suppressed under the motion and under each control; ego beside mover where labelled."""
+    if not result.controls:
+        return None
+    tallies = {"motion given": result.tally} | {_NAMES[name]: tally for name, tally in result.controls.items()}
+    names = list(tallies)
+    labelled = result.tally.labelled
+    drawn = style.figure(10.5, 2.9)
+    panels = drawn.subplots(1, 2 if labelled else 1, squeeze=False)[0]
+    bars = panels[0].bar(
+        names,
+        [tally.share(on_disc=True).ratio for tally in tallies.values()],
+        width=0.6,
+        color=[style.RESIDUAL] + [style.BEFORE] * (len(names) - 1),
+    )
+    panels[0].bar_label(bars, fmt=lambda value: f"{value:.1%}", padding=2, fontsize=8)
+    panels[0].set_title("suppressed on the disc")
+    if labelled:
+        place = np.arange(len(names))
+        for shift, label, colour in ((-0.2, "ego", style.EGO), (0.2, "mover", style.MOVER)):
+            shares = [(tally.selectivity() or {})[label] for tally in tallies.values()]
+            bars = panels[1].bar(place + shift, shares, width=0.38, color=colour, label=label)
+            panels[1].bar_label(bars, fmt=lambda value: f"{value:.0%}", padding=2, fontsize=7)
+        panels[1].set_xticks(place, names)
+        panels[1].set_title("suppressed by cause")
+        panels[1].legend(loc="upper right", ncols=2)
+    for panel in panels:
+        panel.set_ylim(0, 1.08)
+        panel.yaxis.set_major_formatter(PercentFormatter(1.0))
+        style.tidy(panel)
+    return drawn
+
+
+def radial_profile(result: RunResult) -> Figure | None:
+    """Draw density before and after and the share suppressed, by distance from the centre (thesis, Fig. 7.3)."""
+    area, events, residual = result.tally.radial()
+    seen = area > 0
+    if not events.any():
+        return None
+    edges = result.region.ring_edges_px
+    middle = ((edges[1:] + edges[:-1]) / 2)[seen]
+    drawn = style.figure(10.5, 3.2)
+    left, right = drawn.subplots(1, 2)
+    for counts, colour, name in ((events, style.BEFORE, "all events"), (residual, style.RESIDUAL, "residual")):
+        density = counts[seen] / area[seen]
+        left.plot(middle, density, color=colour, label=name, linewidth=1.6)
+        left.fill_between(middle, density, color=colour, alpha=0.15, linewidth=0)
+    left.set(title="density", xlabel="distance from the centre (px)", ylabel="events a pixel", ylim=(0, None))
+    left.legend()
+    enough = events[seen] >= 50
+    share = 1 - residual[seen][enough] / events[seen][enough]
+    right.plot(middle[enough], share, color=style.RESIDUAL, linewidth=1.6)
+    right.set(
+        title="share suppressed (rings of 50 events or more)", xlabel="distance from the centre (px)", ylim=(0, 1.02)
+    )
+    right.yaxis.set_major_formatter(PercentFormatter(1.0))
+    for panel in (left, right):
+        panel.set_xlim(max(0.0, middle[0] - 4), min(middle[-1], max(1.6 * result.region.radius_px, middle[0] + 16)))
+        panel.axvline(result.region.radius_px, color=style.MUTED, linestyle="--", linewidth=0.8)
+        style.tidy(panel)
+    return drawn
+
+
+def displacement(result: RunResult) -> Figure | None:
+    """Draw the matches by offset and by lateness (thesis, §7.5)."""
+    found = result.displacement
+    total = int(found.by_offset.sum())
+    if not total:
+        return None
+    drawn = style.figure(10.5, 3.2)
+    left, right = drawn.subplots(1, 2, width_ratios=(1, 2))
+    reach = found.reach_px + 0.5
+    share = found.by_offset / total
+    shown = left.imshow(share, cmap="Greens", extent=(-reach, reach, reach, -reach), vmin=0)
+    if found.side <= 7:
+        for (row, column), value in np.ndenumerate(share):
+            if value:
+                dark = value > 0.6 * share.max()
+                left.text(
+                    column - found.reach_px, row - found.reach_px, f"{value:.0%}", ha="center", va="center",
+                    fontsize=7, color="white" if dark else style.INK,
+                )  # fmt: skip
+    else:
+        drawn.colorbar(shown, ax=left, format=PercentFormatter(1.0))
+    left.set(title="event − prediction (px)", xlabel="dx", ylabel="dy")
+    edges = found.lateness_edges_us
+    right.bar(
+        edges[:-1], found.by_lateness / total, width=np.diff(edges), align="edge", color=style.RESIDUAL, alpha=0.85
+    )
+    right.axvline(0, color=style.MUTED, linewidth=0.8)
+    right.set(title="event − prediction (µs)", xlabel="lateness (µs)", xlim=(edges[0], edges[-1]))
+    right.yaxis.set_major_formatter(PercentFormatter(1.0))
+    style.tidy(right)
+    return drawn
+
+
+def rate(result: RunResult) -> Figure | None:
+    """Draw the event rate before and after, over the whole stream."""
+    seconds, before, after = result.rate.series()
+    drawn = style.figure(10.5, 2.6)
+    axes = drawn.subplots()
+    milliseconds = seconds * 1000
+    for rates, colour, name in ((before, style.BEFORE, "all events"), (after, style.RESIDUAL, "residual")):
+        axes.step(milliseconds, rates / 1e6, where="post", color=colour, label=name, linewidth=1.2)
+        axes.fill_between(milliseconds, rates / 1e6, step="post", color=colour, alpha=0.2, linewidth=0)
+    axes.axvspan(0, result.settings.cancel.warm_up_us / 1000, color=style.GRID, alpha=0.7, linewidth=0)
+    axes.set(
+        xlabel="time since the first event (ms)", ylabel="Mev/s", ylim=(0, None), xlim=(0, max(milliseconds[-1], 1))
+    )
+    axes.legend(loc="upper right", ncols=2)
+    style.tidy(axes)
+    return drawn
