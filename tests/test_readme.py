@@ -79,7 +79,7 @@ def test_the_configuration_of_the_readme_is_valid(readme: str, tmp_path: Path) -
 def test_the_architecture_section_and_the_tree_agree(readme: str, repository: Path) -> None:
     section = readme.split("## Architecture")[1].split("##")[0]
     top = set(re.findall(r"^(\w+)/ ", section, flags=re.MULTILINE))
-    named = {name for name in re.findall(r"^  (\w+(?:\.py|/)) ", section, flags=re.MULTILINE)}
+    named = set(re.findall(r"^  (\w+(?:\.py|/)) ", section, flags=re.MULTILINE))
     inside = {
         path.name + ("/" if path.is_dir() else "")
         for path in (repository / "tiegocancel").iterdir()

@@ -2,10 +2,10 @@
 
     python tests/benchmarks/bench_canceller.py [--events N] [--repeats R]
 
-Streams: the built-in disc scene, edges (lines of a turning pattern, no noise) and uniform events; each with and without
-``source``. The C code is ``packed.c``, compiled here, called for the same chunks, each with fresh arrays for its answers
-as ``process`` has them. Times are the best of R runs taken in turn, because these machines
-are noisy; decisions must be equal or the run stops.
+Streams: the built-in disc scene, edges (lines of a turning pattern, no noise) and uniform events; each with and
+without ``source``. The C code is ``packed.c``, compiled here, called for the same chunks, each with fresh arrays for
+its answers as ``process`` has them. Times are the best of R runs taken in turn, because machines are noisy; decisions
+must be equal or the run stops.
 """
 
 from __future__ import annotations

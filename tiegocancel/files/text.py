@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from typing import ClassVar
 
@@ -19,14 +20,16 @@ __all__ = ["TextReader"]
 
 _BLOCK_BYTES = 1 << 20
 _SAMPLE_BYTES = 1 << 16
+_SECONDS = re.compile(r"\d+\.\d{6,}", re.ASCII)
 
 
 class TextReader(EventReader):
     """Read rows ``x,y,p,t`` or ``t x y p``, separated by commas, semicolons or white space; ``#`` begins a comment.
 
-    Polarity is {0, 1} or {−1, 1}. The unit of time is the header's or declared, never guessed. Without a header
-    the order of the columns is declared or decided by content. Decimal times become whole microseconds exactly:
-    digit by digit, halves away from zero. Rows count from 1, header and comments included.
+    Polarity is {0, 1} or {−1, 1}. The unit of time is the header's or declared. One layout carries its unit without a
+    header: ``t x y p`` between blanks with six decimals or more in ``t``, which public data sets write in seconds.
+    Without a header the order of the columns is declared or decided by content. Decimal times become whole
+    microseconds exactly: digit by digit, halves away from zero. Rows count from 1, header and comments included.
     """
 
     format: ClassVar[str] = "text"
@@ -47,7 +50,8 @@ class TextReader(EventReader):
         if not self._columns:
             self._columns = self._decided()
             self.note(f"columns {','.join(self._columns)}, decided by content")
-        unit = self.options.time_unit or header.time_unit
+        by_layout = "" if self.options.time_unit or header.time_unit else self._unit_by_layout()
+        unit = self.options.time_unit or header.time_unit or by_layout
         if not unit:
             shown = (header.delimiter or " ").join(header.first_row)
             raise self.fail(
@@ -57,9 +61,17 @@ class TextReader(EventReader):
             )
         self.time_unit = unit
         source = "as declared" if self.options.time_unit else "from the header"
+        if by_layout:
+            source = "as public data sets write t x y p with decimals; --time-unit declares another"
         if header.time_unit not in ("", unit):
             source = f"as declared, although the header says {header.time_unit}"
         self.note(f"time unit: {unit}, {source}")
+
+    def _unit_by_layout(self) -> str:
+        """Return ``s`` for the layout of public data sets (UZH event-camera data set and its kin), else nothing."""
+        header = self._header
+        known = not header.columns and not header.delimiter and self._columns == "txyp"
+        return "s" if known and _SECONDS.fullmatch(header.first_row[0]) else ""
 
     def _decided(self) -> str:
         """Decide the order of four columns by the first rows."""

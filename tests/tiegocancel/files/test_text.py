@@ -76,6 +76,17 @@ def test_the_unit_is_never_guessed_and_the_message_names_the_flag(saved: Save) -
     assert "\n" not in str(caught.value)
 
 
+def test_the_layout_of_public_data_sets_is_in_seconds_and_says_so(saved: Save) -> None:
+    path = saved("a.txt", "0.000000011 3 4 1\n0.000011001 40 5 0\n")
+    with open_events(path) as reader:
+        assert reader.time_unit == "s"
+        assert any("time unit: s, as public data sets write" in note for note in reader.notes)
+    assert read_events(path).t.tolist() == [0, 11]
+    assert open_events(path, time_unit="ms").time_unit == "ms"
+    with pytest.raises(InputError, match="--time-unit"):
+        open_events(saved("b.csv", "0.000000011,3,4,1\n0.000011001,40,5,0\n"))
+
+
 def test_the_unit_is_always_told(saved: Save) -> None:
     path = saved("a.csv", "x,y,p,t_us\n3,4,1,11\n")
     assert "time unit: us, from the header" in open_events(path).notes
