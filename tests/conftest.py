@@ -14,6 +14,7 @@ _CACHE = tempfile.TemporaryDirectory(prefix="tiegocancel-tests-")
 os.environ["TI_OFFLINE_CACHE_FILE_PATH"] = str(Path(_CACHE.name) / "taichi")
 os.environ["MPLCONFIGDIR"] = str(Path(_CACHE.name) / "matplotlib")
 os.environ["MPLBACKEND"] = "Agg"
+os.environ["PYTHONSAFEPATH"] = "1"  # programs started by a test import what the test imports, not the tree around them
 
 settings.register_profile("house", deadline=None, derandomize=bool(os.environ.get("CI")))
 settings.load_profile("house")

@@ -6,6 +6,7 @@ Names are loaded on first use, so that importing the package costs nothing and p
 from __future__ import annotations
 
 import importlib
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -18,6 +19,12 @@ if TYPE_CHECKING:
     from tiegocancel.motion.trajectory import RotationTrajectory
 
 __version__ = "0.1.0"
+
+# In a source tree the two other rooms lie beside this folder, and an interpreter started there finds this folder
+# before the installed package: let it find the rooms too.
+_tree = Path(__file__).resolve().parent.parent
+if (_tree / "pyproject.toml").exists() and (_tree / "kernels" / "runtime.py").exists():
+    __path__.append(str(_tree))
 
 _HOME = {
     "CancelConfig": "tiegocancel.matching.config",
