@@ -41,7 +41,7 @@ def run(args: argparse.Namespace) -> int:
     from tiegocancel.cli.session import Session
     from tiegocancel.events import Events
     from tiegocancel.motion.source import trajectory_from
-    from tiegocancel.scene import ground_truth, simulate
+    from tiegocancel.scene import ground_truth, photograph, simulate
 
     scene, duration_s, seed = settings.scene, settings.simulate.duration_s, settings.simulate.seed
     if settings.motion.source == "truth":
@@ -69,4 +69,5 @@ def run(args: argparse.Namespace) -> int:
         labelled=True,
         notes=[],
         expected_us=round(duration_s * 1e6),
+        photograph=photograph(scene, time_s=duration_s / 2),
     )

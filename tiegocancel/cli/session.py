@@ -9,6 +9,9 @@ import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from tiegocancel.cli.progress import event_progress
 from tiegocancel.errors import ConfigError, InputError
 from tiegocancel.events import Events
@@ -39,6 +42,7 @@ class Session:
         fit: RotationFit | None = None,
         disc_radius_px: float | None = None,
         expected_us: int | None = None,
+        photograph: NDArray[np.float32] | None = None,
     ) -> int:
         """Return the exit code: 1 when the input ended in a fault; what came before it is on disk then."""
         self._make_folder()
@@ -51,6 +55,7 @@ class Session:
                 height=height,
                 sink=sink,
                 disc_radius_px=disc_radius_px,
+                expected_us=expected_us,
                 progress=advance,
             )
         for note in [*notes, *trajectory.notes]:
@@ -60,7 +65,7 @@ class Session:
         for note in result.notes:
             sys.stderr.write(f"note: {note}\n")
         verdict = judge(result)
-        self._write(result, verdict, fit, notes)
+        self._write(result, verdict, fit, notes, photograph)
         if result.fault is not None:
             sys.stderr.write(f"tiegocancel: {result.fault}\n")
             return 1
@@ -84,12 +89,19 @@ class Session:
         with open_writer(path, width=width, height=height, labelled=labelled, format=format) as writer:
             yield writer
 
-    def _write(self, result: RunResult, verdict: Verdict, fit: RotationFit | None, notes: list[str]) -> None:
+    def _write(
+        self,
+        result: RunResult,
+        verdict: Verdict,
+        fit: RotationFit | None,
+        notes: list[str],
+        photograph: NDArray[np.float32] | None,
+    ) -> None:
         """Write figures, report and manifest; print the numbers."""
         from tiegocancel.report import draw_figures, write_manifest, write_page
 
         with event_progress("drawing", None):
-            drawings = draw_figures(result, self.out) if self.settings.output.figures else []
+            drawings = draw_figures(result, self.out, photograph) if self.settings.output.figures else []
         page = self.out / "report.html"
         write_page(page, result, verdict, drawings, title=self.title, notes=notes)
         numbers = result.to_json()

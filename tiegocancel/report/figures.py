@@ -6,10 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
-from tiegocancel.report.images import before_after, time_slices
+from tiegocancel.report.images import before_after, scene, time_slices
 from tiegocancel.report.plots import controls, displacement, radial_profile, rate
 from tiegocancel.report.style import STYLE
 from tiegocancel.study.result import RunResult
@@ -17,6 +19,10 @@ from tiegocancel.study.result import RunResult
 __all__ = ["Drawing", "draw_figures"]
 
 DPI = 150
+_SCENE = (
+    "What an ordinary camera would see, beside what the event camera fires in the same instants. The disc turns before "
+    "a fixed camera, which is the same to the sensor as a camera that rolls; the hand moves by itself."
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,10 +81,17 @@ _FIGURES: tuple[tuple[str, str, Callable[[RunResult], Figure | None], str], ...]
 )
 
 
-def draw_figures(result: RunResult, folder: Path) -> list[Drawing]:
-    """Write the figures of ``result`` as PNG files into ``folder``; return them in the order of the report."""
+def draw_figures(result: RunResult, folder: Path, photograph: NDArray[np.float32] | None = None) -> list[Drawing]:
+    """Write the figures of ``result`` as PNG files into ``folder``; return them in the order of the report.
+
+    ``photograph`` float32[height, width] is the intensity that a camera would see, where the scene is known.
+    """
     drawings = []
     with rc_context(STYLE):
+        if photograph is not None:
+            path = folder / "scene.png"
+            scene(photograph, result).savefig(path, dpi=DPI)
+            drawings.append(Drawing(path, "The scene", _SCENE))
         for name, title, draw, caption in _FIGURES:
             drawn = draw(result)
             if drawn is None:

@@ -12,7 +12,7 @@ from tiegocancel.events import EGO, MOVER, NOISE, Events
 from tiegocancel.report import style
 from tiegocancel.study.result import RunResult
 
-__all__ = ["before_after", "signed_counts", "time_slices"]
+__all__ = ["before_after", "scene", "signed_counts", "time_slices"]
 
 _CAUSES = ((NOISE, "noise", style.NOISE), (EGO, "ego-motion", style.EGO), (MOVER, "mover", style.MOVER))
 _PIXELS_ACROSS = 1500  # image pixels that a figure shows side by side
@@ -26,6 +26,25 @@ def signed_counts(events: Events) -> NDArray[np.int64]:
     off = np.bincount(pixel[events.p == 0], minlength=size)
     signed: NDArray[np.int64] = (on - off).reshape(events.height, events.width)
     return signed
+
+
+def scene(photograph: NDArray[np.float32], result: RunResult) -> Figure:
+    """Draw the intensity float32[height, width] beside the signed events of the picture."""
+    drawn = style.figure(10.5, 10.5 / 2 * result.height / result.width + 0.45)
+    left, right = drawn.subplots(1, 2)
+    extent = (-0.5, result.width - 0.5, result.height - 0.5, -0.5)
+    left.imshow(photograph, cmap="gray", vmin=0, extent=extent)
+    left.set_title("intensity")
+    events = result.picture.events()
+    if events is not None:
+        block = max(round(result.width * 2 / _PIXELS_ACROSS), 1)
+        image = _blocks(signed_counts(events), block)
+        reach = (-0.5, image.shape[1] * block - 0.5, image.shape[0] * block - 0.5, -0.5)
+        right.imshow(image, cmap=style.SIGNED, vmin=-2, vmax=2, extent=reach, interpolation="nearest")
+        right.set_title(f"events of {events.span_us / 1000:.1f} ms")
+    for panel in (left, right):
+        panel.set(xticks=[], yticks=[], xlim=extent[:2], ylim=extent[2:])
+    return drawn
 
 
 def before_after(result: RunResult) -> Figure | None:

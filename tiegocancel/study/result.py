@@ -85,6 +85,10 @@ class RunResult:
                 for name, on_disc in (("disc", True), ("background", False))
             },
             "disc_radius_px": self.region.radius_px,
+            "radial_profile": {
+                "ring_edges_px": self.region.ring_edges_px.tolist(),
+                **dict(zip(("area_px", "events", "residual"), (c.tolist() for c in self.tally.radial()), strict=True)),
+            },
             "signal_to_noise": self.tally.signal_to_noise(),
             "motion": {
                 "center_px": [float(center[0]), float(center[1])],

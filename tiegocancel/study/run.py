@@ -64,11 +64,13 @@ def run_stream(
     height: int,
     sink: _Sink | None = None,
     disc_radius_px: float | None = None,
+    expected_us: int | None = None,
     progress: Callable[[Events], None] | None = None,
 ) -> RunResult | None:
     """Cancel a stream, write what remains to ``sink``, measure it; return ``None`` for a stream without events.
 
-    ``disc_radius_px`` is used where the settings leave it open. When ``chunks`` raises a :class:`TiegoCancelError`,
+    ``disc_radius_px`` is used where the settings leave it open; pictures are taken half-way through ``expected_us`` of
+    stream, or after the warm-up where that is unknown. When ``chunks`` raises a :class:`TiegoCancelError`,
     what came before counts and the error's line stands in ``RunResult.fault``.
     """
     run: _Run | None = None
@@ -76,7 +78,7 @@ def run_stream(
     try:
         for chunk in rechunk(chunks, settings.report.chunk_events):
             if run is None:
-                run = _Run(settings, trajectory, chunk, disc_radius_px)
+                run = _Run(settings, trajectory, chunk, disc_radius_px, expected_us)
             residual = run.process(chunk)
             if sink is not None:
                 sink.write(residual)
@@ -93,7 +95,12 @@ class _Run:
     """Everything that one pass accumulates; begins with the first chunk, which decides start time and disc."""
 
     def __init__(
-        self, settings: Settings, trajectory: RotationTrajectory, first: Events, disc_radius_px: float | None
+        self,
+        settings: Settings,
+        trajectory: RotationTrajectory,
+        first: Events,
+        disc_radius_px: float | None,
+        expected_us: int | None,
     ) -> None:
         config = settings.cancel
         self.settings, self.trajectory = settings, trajectory
@@ -111,9 +118,10 @@ class _Run:
         self.tally = Tally(self.region, counted_from_us)
         self.displacement = DisplacementHistogram(config, counted_from_us)
         self.rate = RateProfile(self.first_us)
-        self.picture = Stretch(counted_from_us, span_us=10_000, longest_us=250_000, enough=40_000, most=400_000)
+        pictured_us = max(counted_from_us, self.first_us + (expected_us or 0) // 2)
+        self.picture = Stretch(pictured_us, span_us=10_000, longest_us=250_000, enough=40_000, most=400_000)
         self.slice = Stretch(
-            counted_from_us, span_us=60_000, longest_us=1_000_000, enough=1500, most=60_000, rows=self._slice_rows()
+            pictured_us, span_us=60_000, longest_us=1_000_000, enough=1500, most=60_000, rows=self._slice_rows()
         )
         self.controls = {name: self._control(name, counted_from_us) for name in self._wanted_controls()}
         self.canceller.prepare()

@@ -40,6 +40,11 @@ def judge(result: RunResult) -> Verdict:
         f"Within the horizon of {config.horizon_us / 1000:g} ms the rim of the disc moves {rim:.1f} px; the spatial "
         f"gate reaches {gate:g} px."
     )
+    if rim > 2 * gate:
+        moved += (
+            " Whatever does not follow the motion is elsewhere by then, and that is what makes a match selective; the "
+            "price is a ring that holds the events of a whole horizon."
+        )
     compared = (
         f"On the disc {share.ratio:.1%} are suppressed; with {_NAMES[rival]} it would be {controls[rival]:.1%}: "
         f"a gap of {100 * gap:.1f} points."
