@@ -19,13 +19,13 @@ def rechunk(chunks: Iterable[Events], size: int) -> Iterator[Events]:
     held: list[Events] = []
     count = 0
     source = iter(chunks)
-    fault: Exception | None = None
+    fault: BaseException | None = None
     while True:
         try:
             chunk = next(source)
         except StopIteration:
             break
-        except Exception as error:
+        except (Exception, KeyboardInterrupt) as error:
             fault = error
             break
         held.append(chunk)

@@ -18,7 +18,7 @@ from tiegocancel.events import Events
 from tiegocancel.files import EventWriter, open_writer
 from tiegocancel.motion.fit import RotationFit
 from tiegocancel.motion.trajectory import RotationTrajectory
-from tiegocancel.study import RunResult, Settings, Verdict, judge, run_stream
+from tiegocancel.study import INTERRUPTED, RunResult, Settings, Verdict, judge, run_stream
 
 __all__ = ["Session"]
 
@@ -44,7 +44,10 @@ class Session:
         expected_us: int | None = None,
         photograph: NDArray[np.float32] | None = None,
     ) -> int:
-        """Return the exit code: 1 when the input ended in a fault; what came before it is on disk then."""
+        """Return the exit code: 1 when the input ended in a fault, 130 when the user ended it.
+
+        What came before that is on disk in either case.
+        """
         self._make_folder()
         with self._residual(width, height, labelled) as sink, event_progress("cancelling", expected_us) as advance:
             result = run_stream(
@@ -68,7 +71,7 @@ class Session:
         self._write(result, verdict, fit, notes, photograph)
         if result.fault is not None:
             sys.stderr.write(f"tiegocancel: {result.fault}\n")
-            return 1
+            return 130 if result.fault == INTERRUPTED else 1
         return 0
 
     def _make_folder(self) -> None:

@@ -13,7 +13,10 @@ from tiegocancel.motion.trajectory import RotationTrajectory
 from tiegocancel.study.settings import Settings
 from tiegocancel.study.stretch import Stretch
 
-__all__ = ["RunResult"]
+__all__ = ["INTERRUPTED", "RunResult"]
+
+INTERRUPTED = "interrupted"
+"""What ``fault`` says when the user ended the run."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

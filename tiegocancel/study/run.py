@@ -23,7 +23,7 @@ from tiegocancel.metrics import (
 )
 from tiegocancel.motion.schedule import MotionSchedule
 from tiegocancel.motion.trajectory import RotationTrajectory
-from tiegocancel.study.result import RunResult
+from tiegocancel.study.result import INTERRUPTED, RunResult
 from tiegocancel.study.settings import Settings
 from tiegocancel.study.stretch import Stretch
 
@@ -71,7 +71,7 @@ def run_stream(
 
     ``disc_radius_px`` is used where the settings leave it open; pictures are taken half-way through ``expected_us`` of
     stream, or after the warm-up where that is unknown. When ``chunks`` raises a :class:`TiegoCancelError`,
-    what came before counts and the error's line stands in ``RunResult.fault``.
+    what came before counts and the error's line stands in ``RunResult.fault``; so it is when the user interrupts.
     """
     run: _Run | None = None
     fault: str | None = None
@@ -84,10 +84,11 @@ def run_stream(
                 sink.write(residual)
             if progress is not None:
                 progress(chunk)
-    except TiegoCancelError as error:
+    except (TiegoCancelError, KeyboardInterrupt) as error:
         if run is None:
             raise
-        fault = str(error)
+        interrupted = isinstance(error, KeyboardInterrupt)
+        fault = INTERRUPTED if interrupted else str(error)
     return None if run is None else run.finish(fault)
 
 

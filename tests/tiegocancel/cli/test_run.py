@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -144,6 +145,24 @@ def test_a_sensor_declared_too_small_names_the_row_and_the_value(
     arguments = ["run", str(source), "--motion", MOTION, "--width", "64", "--no-figures", "--out", str(tmp_path)]
     assert main(arguments) == 1
     assert re.search(r"ring\.npz: row \d+: x is \d+, expected 0 to 63", capsys.readouterr().err)
+
+
+def test_an_interrupted_run_reports_what_it_did(
+    source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from tiegocancel.files.reader import EventReader
+
+    def interrupted(self: EventReader) -> Iterator[Events]:
+        yield read_events(source)[:500]
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(EventReader, "__iter__", interrupted)
+    assert main(["run", str(source), "--motion", MOTION, "--out", str(tmp_path), "--no-figures"]) == 130
+    monkeypatch.undo()
+    assert capsys.readouterr().err.splitlines()[-1] == "tiegocancel: interrupted"
+    results = json.loads((tmp_path / "manifest.json").read_text(encoding="utf-8"))["results"]
+    assert (results["fault"], results["events"]) == ("interrupted", 500)
+    assert len(read_events(tmp_path / "residual.npz")) == results["residual"]
 
 
 def test_an_empty_recording_is_said_to_be_empty(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
