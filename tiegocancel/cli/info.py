@@ -10,6 +10,7 @@ from typing import Any
 
 from tiegocancel.cli.options import add_reading_options, reader_from
 from tiegocancel.cli.progress import event_progress
+from tiegocancel.units import rate_text
 
 __all__ = ["add_parser", "run"]
 
@@ -78,17 +79,9 @@ def _table(facts: dict[str, Any]) -> list[tuple[str, str]]:
             ("first", f"{facts['first_us']:,} µs"),
             ("last", f"{facts['last_us']:,} µs"),
             ("span", f"{facts['span_us'] / 1e6:.6f} s"),
-            ("mean rate", "-" if facts["mean_rate_hz"] is None else _rate(facts["mean_rate_hz"])),
-            ("peak rate", f"{_rate(facts['peak_rate_hz'])} (in 1 ms)"),
+            ("mean rate", "-" if facts["mean_rate_hz"] is None else rate_text(facts["mean_rate_hz"])),
+            ("peak rate", f"{rate_text(facts['peak_rate_hz'])} (in 1 ms)"),
             ("ON share", f"{facts['on_share']:.3f}"),
         ]
     rows += [("time unit", facts["time_unit"]), ("labels", "yes" if facts["labelled"] else "no")]
     return rows + [("note", note) for note in facts["notes"]]
-
-
-def _rate(hertz: float) -> str:
-    """Print events a second in a readable size."""
-    for factor, unit in ((1e6, "Mev/s"), (1e3, "kev/s")):
-        if hertz >= factor:
-            return f"{hertz / factor:.3f} {unit}"
-    return f"{hertz:.3f} ev/s"

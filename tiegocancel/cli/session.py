@@ -19,6 +19,7 @@ from tiegocancel.files import EventWriter, open_writer
 from tiegocancel.motion.fit import RotationFit
 from tiegocancel.motion.trajectory import RotationTrajectory
 from tiegocancel.study import INTERRUPTED, RunResult, Settings, Verdict, judge, run_stream
+from tiegocancel.units import rate_text
 
 __all__ = ["Session"]
 
@@ -147,6 +148,6 @@ def _summary(result: RunResult, verdict: Verdict) -> str:
             f"  by label     ego {selectivity['ego']:.1%}, mover {selectivity['mover']:.1%}, "
             f"noise {selectivity['noise']:.1%}: J = {selectivity['j']:.3f}"
         )
-    rate = result.counters.events / result.seconds / 1e6 if result.seconds else 0.0
-    lines.append(f"  speed        {rate:.1f} Mev/s; state {result.state.total_kib:,.0f} KiB")
+    rate_hz = result.counters.events / result.seconds if result.seconds else 0.0
+    lines.append(f"  speed        {rate_text(rate_hz)}; state {result.state.total_kib:,.0f} KiB")
     return "\n".join(lines) + "\n"

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from tiegocancel.study.settings import Settings
+from tiegocancel.units import rate_text
 
 __all__ = ["add_parser", "run"]
 
@@ -65,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
     rate_hz = events / duration_s if duration_s else 0.0
     shares = ", ".join(f"{count:,} {name}" for name, count in zip(LABELS, counts.tolist(), strict=True))
     sys.stderr.write(
-        f"{args.out}: {events:,} events in {duration_s:g} s ({rate_hz / 1e6:.2f} Mev/s: {shares}); "
+        f"{args.out}: {events:,} events in {duration_s:g} s ({rate_text(rate_hz)}: {shares}); "
         f"motion in {motion_path}; took {seconds:.1f} s\n"
     )
     if args.json:

@@ -45,25 +45,24 @@ class DiscRegion:
         return codes
 
 
-def estimate_radius_px(events: Events, center_px: tuple[float, float], *, ring_px: float = 4.0) -> float | None:
-    """Guess the radius of the disc in px from where the density of events drops; ``None`` when none is seen.
+def estimate_radius_px(events: Events, center_px: tuple[float, float], *, ring_px: float = 4.0) -> tuple[float, bool]:
+    """Guess the radius of the disc in px from the density of events; say whether an edge was seen.
 
     The radial density is split in two at the radius that explains most of its variance over the sensor's area: the
-    edge of a turning disc is where the world goes quiet. A centre beyond the sensor, or a split that explains less
-    than half of the variance, is no disc.
+    edge of a turning disc is where the world goes quiet. Where the centre lies beyond the sensor, or no split
+    explains half of the variance, the circle that holds 99 % of the events is returned instead.
     """
-    if not (0 <= center_px[0] < events.width and 0 <= center_px[1] < events.height):
-        return None
     whole = DiscRegion(events.width, events.height, center_px=center_px, radius_px=0.0, ring_px=ring_px)
     area = whole.areas_px.sum(axis=1).astype(np.float64)
     count = np.bincount(whole.codes(events) >> 1, minlength=whole.rings).astype(np.float64)
+    inside = 0 <= center_px[0] < events.width and 0 <= center_px[1] < events.height
     area_in, count_in = np.cumsum(area)[:-1], np.cumsum(count)[:-1]
     area_out, count_out = area.sum() - area_in, count.sum() - count_in
-    valid = (area_in > 0) & (area_out > 0)
     with np.errstate(divide="ignore", invalid="ignore"):
         drop = count_in / area_in - count_out / area_out
-        explained = np.where(valid & (drop > 0), area_in * area_out * drop**2, 0.0)
+        explained = np.where((area_in > 0) & (area_out > 0) & (drop > 0), area_in * area_out * drop**2, 0.0)
     total = area.sum() * (area * (count / np.maximum(area, 1) - count.sum() / area.sum()) ** 2).sum()
-    if not explained.size or explained.max() < 0.5 * total or explained.max() <= 0:
-        return None
-    return float(whole.ring_edges_px[int(np.argmax(explained)) + 1])
+    if inside and explained.size and explained.max() > 0.5 * total:
+        return float(whole.ring_edges_px[int(np.argmax(explained)) + 1]), True
+    holds = int(np.searchsorted(np.cumsum(count), 0.99 * count.sum(), side="left"))
+    return float(whole.ring_edges_px[min(holds, whole.rings - 1) + 1]), False

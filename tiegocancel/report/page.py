@@ -13,6 +13,7 @@ from typing import Any
 from tiegocancel.report.figures import Drawing
 from tiegocancel.study.result import RunResult
 from tiegocancel.study.verdict import Verdict
+from tiegocancel.units import rate_text
 
 __all__ = ["write_page"]
 
@@ -49,10 +50,10 @@ def write_page(
 
 
 def _subtitle(result: RunResult) -> str:
-    rate = result.counters.events / result.duration_s / 1e6 if result.duration_s else 0.0
+    rate_hz = result.counters.events / result.duration_s if result.duration_s else 0.0
     return (
         f"{result.counters.events:,} events of {result.width}×{result.height} px in {result.duration_s:.3f} s "
-        f"({rate:.2f} Mev/s), horizon {result.settings.cancel.horizon_us / 1000:g} ms"
+        f"({rate_text(rate_hz)}), horizon {result.settings.cancel.horizon_us / 1000:g} ms"
     )
 
 
@@ -71,12 +72,10 @@ def _tiles(result: RunResult, numbers: dict[str, Any]) -> list[tuple[str, str, s
         tiles.append((f"{selectivity['mover']:.1%}", "of the mover lost", "suppressed wrongly"))
         tiles.append((f"{selectivity['j']:.2f}", "selectivity J", "ego − mover share"))
     if result.duration_s:
-        after = (numbers["events"] - numbers["suppressed"]) / result.duration_s / 1e6
-        tiles.append(
-            (f"{after:.2f} Mev/s", "still sent", f"of {numbers['events'] / result.duration_s / 1e6:.2f} Mev/s")
-        )
+        before, after = (numbers[name] / result.duration_s for name in ("events", "residual"))
+        tiles.append((rate_text(after), "still sent", f"of {rate_text(before)}"))
     tiles.append((f"{numbers['state']['kib']:,.0f} KiB", "of state", "ring and table, constant"))
-    tiles.append((f"{numbers['events_per_second'] / 1e6:.1f} Mev/s", "decided", "on this machine, one thread"))
+    tiles.append((rate_text(numbers["events_per_second"]), "decided", "on this machine, one thread"))
     return tiles
 
 
@@ -104,7 +103,8 @@ def _control_table(result: RunResult, numbers: dict[str, Any]) -> str:
 def _ratio_row(name: str, meaning: str, whole: float, control: str | None, numbers: dict[str, Any]) -> str:
     regions = [numbers["regions"][region] for region in ("disc", "background")]
     shares = [whole] + [region["controls"][control] if control else region["cancellation_ratio"] for region in regions]
-    cells = [f"{share:.1%}" for share in shares]
+    counts = [numbers["warm_up"]["events_counted"], *(region["events"] for region in regions)]
+    cells = [f"{share:.1%}" if count else "–" for share, count in zip(shares, counts, strict=True)]
     if numbers["selectivity"] is not None:
         selectivity = numbers["selectivity_of_controls"][control] if control else numbers["selectivity"]
         cells += [f"{selectivity[cause]:.1%}" for cause in ("ego", "mover", "noise")] + [f"{selectivity['j']:.2f}"]

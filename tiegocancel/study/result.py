@@ -11,7 +11,7 @@ from tiegocancel.matching.canceller import Counters
 from tiegocancel.metrics import DiscRegion, DisplacementHistogram, RateProfile, Tally
 from tiegocancel.motion.trajectory import RotationTrajectory
 from tiegocancel.study.settings import Settings
-from tiegocancel.study.stretch import Stretch
+from tiegocancel.study.stretch import Densest
 
 __all__ = ["INTERRUPTED", "RunResult"]
 
@@ -38,8 +38,8 @@ class RunResult:
     controls: dict[str, Tally]
     displacement: DisplacementHistogram
     rate: RateProfile
-    picture: Stretch
-    slice: Stretch
+    picture: Densest
+    slice: Densest
     counters: Counters
     seconds: float
     fault: str | None = None

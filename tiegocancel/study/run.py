@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Iterable
 from typing import Protocol
@@ -25,7 +24,8 @@ from tiegocancel.motion.schedule import MotionSchedule
 from tiegocancel.motion.trajectory import RotationTrajectory
 from tiegocancel.study.result import INTERRUPTED, RunResult
 from tiegocancel.study.settings import Settings
-from tiegocancel.study.stretch import Stretch
+from tiegocancel.study.stretch import Densest
+from tiegocancel.units import rate_text
 
 __all__ = ["CONTROLS", "run_stream"]
 
@@ -120,8 +120,8 @@ class _Run:
         self.displacement = DisplacementHistogram(config, counted_from_us)
         self.rate = RateProfile(self.first_us)
         pictured_us = max(counted_from_us, self.first_us + (expected_us or 0) // 2)
-        self.picture = Stretch(pictured_us, span_us=10_000, longest_us=250_000, enough=40_000, most=400_000)
-        self.slice = Stretch(
+        self.picture = Densest(pictured_us, span_us=10_000, longest_us=250_000, enough=40_000, most=400_000)
+        self.slice = Densest(
             pictured_us, span_us=60_000, longest_us=1_000_000, enough=1500, most=60_000, rows=self._slice_rows()
         )
         self.controls = {name: self._control(name, counted_from_us) for name in self._wanted_controls()}
@@ -154,7 +154,7 @@ class _Run:
             window_s = max(self.settings.cancel.horizon_us - self.settings.cancel.tolerance_us, 0) * 1e-6
             self.notes.append(
                 f"{counters.overflow:,} predictions did not fit the ring of {self.settings.cancel.ring_capacity:,}: "
-                f"at the peak of {self.rate.peak_hz() / 1e6:.2f} Mev/s it needs about "
+                f"at the peak of {rate_text(self.rate.peak_hz())} it needs about "
                 f"{int(self.rate.peak_hz() * window_s):,} (--ring-capacity)"
             )
         if not self.tally.share().events:
@@ -187,14 +187,9 @@ class _Run:
         declared = self.settings.report.disc_radius_px
         radius = given if declared is None else declared
         if radius is None:
-            radius = estimate_radius_px(first, center)
-            if radius is None:
-                radius = math.hypot(self.width, self.height) + math.hypot(*center)
-                self.notes.append("no disc is seen in the density of events: the whole sensor counts as the disc")
-            else:
-                self.notes.append(
-                    f"disc radius {radius:g} px guessed from the radial density (--disc-radius-px declares it)"
-                )
+            radius, edge_seen = estimate_radius_px(first, center)
+            told = "guessed from the radial density" if edge_seen else "of the circle that holds 99 % of the events"
+            self.notes.append(f"disc radius {radius:g} px {told} (--disc-radius-px declares it)")
         return radius
 
     def _slice_rows(self) -> tuple[int, int]:

@@ -7,7 +7,9 @@ from numpy.typing import NDArray
 
 from tiegocancel.events import Events
 
-__all__ = ["Stretch"]
+__all__ = ["Densest", "Stretch"]
+
+_FIRST_WAIT_US = 1_000_000
 
 
 class Stretch:
@@ -33,6 +35,14 @@ class Stretch:
         self._suppressed: list[NDArray[np.bool_]] = []
         self._count = 0
         self._full = False
+
+    def __len__(self) -> int:
+        return self._count
+
+    @property
+    def full(self) -> bool:
+        """Tell whether the stretch has ended."""
+        return self._full
 
     def add(self, events: Events, suppressed: NDArray[np.bool_]) -> None:
         """Take what belongs to the stretch from a chunk."""
@@ -67,3 +77,35 @@ class Stretch:
     def suppressed(self) -> NDArray[np.bool_]:
         """Return bool[n]: which of them were suppressed."""
         return np.concatenate(self._suppressed) if self._suppressed else np.zeros(0, np.bool_)
+
+
+class Densest:
+    """Keep, of stretches that begin 0, 1, 3, 7, 15, … s after ``start_us``, the one with the most events.
+
+    A recording may begin in stillness; its pictures should not. Takes what :class:`Stretch` takes.
+    """
+
+    def __init__(self, start_us: int, *, rows: tuple[int, int] | None = None, **limits: int) -> None:
+        self.rows = rows
+        self._limits = limits
+        self._best = self._current = Stretch(start_us, rows=rows, **limits)
+        self._wait_us = _FIRST_WAIT_US
+
+    def add(self, events: Events, suppressed: NDArray[np.bool_]) -> None:
+        """Take what belongs to a stretch from a chunk."""
+        while True:
+            self._current.add(events, suppressed)
+            if len(self._current) > len(self._best):
+                self._best = self._current
+            if not self._current.full:
+                return
+            self._current = Stretch(self._current.start_us + self._wait_us, rows=self.rows, **self._limits)
+            self._wait_us *= 2
+
+    def events(self) -> Events | None:
+        """Return the events of the densest stretch, ``None`` when there are none."""
+        return self._best.events()
+
+    def suppressed(self) -> NDArray[np.bool_]:
+        """Return bool[n]: which of them were suppressed."""
+        return self._best.suppressed()

@@ -29,7 +29,20 @@ def test_radius_of_a_busy_disc_on_a_quiet_background_is_found() -> None:
     keep = inside | (rng.random(60_000) < 0.05)
     n = int(keep.sum())
     events = Events(np.zeros(n, int), x[keep], y[keep], np.ones(n, int), 320, 240)
-    assert estimate_radius_px(events, (150.0, 120.0)) == pytest.approx(80, abs=4)
+    radius_px, edge_seen = estimate_radius_px(events, (150.0, 120.0))
+    assert radius_px == pytest.approx(80, abs=4)
+    assert edge_seen
+
+
+@pytest.mark.parametrize("center", [(150.0, 120.0), (-500.0, 120.0)])
+def test_without_an_edge_the_circle_holds_nearly_all_events(center: tuple[float, float]) -> None:
+    rng = np.random.default_rng(0)
+    x, y = rng.integers(0, 320, 20_000), rng.integers(0, 240, 20_000)
+    events = Events(np.zeros(20_000, int), x, y, np.ones(20_000, int), 320, 240)
+    radius_px, edge_seen = estimate_radius_px(events, center)
+    assert not edge_seen
+    assert (np.hypot(x - center[0], y - center[1]) <= radius_px).mean() == pytest.approx(0.99, abs=0.01)
+    assert estimate_radius_px(events[:0], center)[1] is False
 
 
 def test_signal_to_noise_is_that_of_densities_and_open_without_background() -> None:
