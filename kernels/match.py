@@ -27,13 +27,16 @@ def cancel(*, polarity, offsets, by_schedule, track_source, state):
     ``by_schedule``: predict with ``coefficients``, else ``ahead`` holds the targets; ``track_source``: fill ``source``.
     """
     start()
-    unrolled = len(offsets) if len(offsets) <= MAX_UNROLLED else 0
-    _kernel(polarity, unrolled, by_schedule, track_source)(**state)
+    window = tuple(offsets.tolist()) if len(offsets) <= MAX_UNROLLED else ()
+    _kernel(polarity, window, by_schedule, track_source)(**state)
 
 
 @cache
-def _kernel(polarity, unrolled, by_schedule, track_source):
-    """Compile one variant; the number of offsets is part of it, their values are not."""
+def _kernel(polarity, window, by_schedule, track_source):
+    """Compile one variant; ``window`` holds linear offsets to compile in, so it is one for each sensor width and gate.
+
+    An empty ``window`` searches the kernel's argument ``offsets`` in a loop.
+    """
     flip = 1 if polarity == "equal" else 0
     blur = 2 if polarity == "ignore" else 0
 
@@ -57,9 +60,7 @@ def _kernel(polarity, unrolled, by_schedule, track_source):
         offsets: ti.types.ndarray(dtype=ti.i32, ndim=1),  # [window] linear, nearest first
         schedule_t: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [K] µs
         coefficients: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [6 K] a b c d e f
-        cells: ti.types.ndarray(
-            dtype=ti.u32, ndim=1
-        ),  # [table + 1], the last one a spare that takes the write of an event without a match
+        cells: ti.types.ndarray(dtype=ti.u32, ndim=1),  # [table + 1], the last a spare for events without a match
         cell_source: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [table + 1], the spare holds −1; [1] when not tracked
         ring: ti.types.ndarray(dtype=ti.u64, ndim=1),  # [capacity] cell index << 32 | packed cell
         ring_source: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [capacity], [1] when not tracked
@@ -118,10 +119,10 @@ def _kernel(polarity, unrolled, by_schedule, track_source):
                 want = ((now - gate_us) << 2) | ((sign ^ ti.u32(flip)) << 1) | ti.u32(blur | 1)
                 met = spare
                 searching = True  # a constant on each path, so that the unrolled search ends in one jump
-                if ti.static(unrolled > 0):
-                    for k in ti.static(range(unrolled)):
+                if ti.static(len(window) > 0):
+                    for offset in ti.static(window):
                         if searching:
-                            beside = here + offsets[k]
+                            beside = here + offset
                             gap = (cells[beside] | ti.u32(blur)) - want
                             if ((gap >> 2) | (gap << 30)) <= twice:
                                 met = beside
