@@ -156,14 +156,20 @@ class Events:
 
     @staticmethod
     def concatenate(parts: list[Events]) -> Events:
-        """Join consecutive chunks of one stream; sensor sizes must agree and time must not decrease across them."""
+        """Join consecutive chunks of one stream; time must not decrease across them.
+
+        Sensor sizes must agree, and either all chunks with events carry labels or none does.
+        """
         if not parts:
             raise ValueError("concatenate needs at least one chunk")
         sizes = {(part.width, part.height) for part in parts}
         if len(sizes) > 1:
             raise ValueError(f"chunks must come from one sensor size, not {sorted(sizes)}")
         width, height = sizes.pop()
-        labelled = all(part.label is not None for part in parts)
+        parts = [part for part in parts if len(part)] or parts[:1]
+        labelled = parts[0].label is not None
+        if any((part.label is not None) != labelled for part in parts):
+            raise ValueError("either all chunks carry labels or none does")
         return Events(
             np.concatenate([part.t for part in parts]),
             np.concatenate([part.x for part in parts]),
@@ -190,6 +196,7 @@ def _column(name: str, values: ArrayLike, dtype: type, low: int, high: int) -> N
     if wrong.any():
         row = int(np.argmax(wrong))
         raise ValueError(f"{name} must be from {low} to {high}: row {row} has {given[row]}")
-    column: NDArray[Any] = np.ascontiguousarray(given, dtype=dtype).view()
+    # A copy, so that nobody can change what was checked: the kernels trust it without looking.
+    column: NDArray[Any] = np.array(given, dtype=dtype, order="C")
     column.flags.writeable = False
     return column

@@ -60,13 +60,13 @@ def uniform(count: int) -> Events:
     )
 
 
-def build_c(folder: Path) -> ctypes.CDLL:
-    """Compile packed.c with -O3 for this machine."""
-    library = folder / "packed.so"
+def build_c(folder: Path, offsets: list[int] | None) -> ctypes.CDLL:
+    """Compile packed.c with -O3 for this machine; ``offsets`` are compiled in, as they are in the kernel."""
+    library = folder / ("packed.so" if offsets is None else "unrolled.so")
     source = Path(__file__).with_name("packed.c")
-    subprocess.run(
-        ["cc", "-O3", "-march=native", "-shared", "-fPIC", "-o", str(library), str(source)], check=True, cwd=folder
-    )
+    window = [] if offsets is None else ["-DWINDOW=" + " ".join(f"LOOK({offset})" for offset in offsets)]
+    command = ["cc", "-O3", "-march=native", "-shared", "-fPIC", *window, "-o", str(library), str(source)]
+    subprocess.run(command, check=True, cwd=folder)
     return ctypes.CDLL(str(library))
 
 
@@ -121,24 +121,29 @@ def main() -> None:
     args = parser.parse_args()
     config = CancelConfig()
     motion = MotionSchedule.rotation(center_px=CENTER, omega_rad_s=OMEGA, horizon_us=config.horizon_us)
-    sys.stdout.write(f"{'stream':9}{'source':>8}{'CR':>8}{'C Mev/s':>10}{'ours Mev/s':>12}{'ratio':>8}\n")
+    sys.stdout.write(f"{'':17}{'':>8}{'Mev/s':>10}{'':24}{'ratio of ours to':>20}\n")
+    names = ("C, loop", "C, unrolled", "ours", "loop", "unrolled")
+    sys.stdout.write(f"{'stream':9}{'source':>8}{'CR':>8}" + "".join(f"{name:>12}" for name in names) + "\n")
+    offsets = Canceller(config, motion, width=WIDTH, height=HEIGHT)._arguments["offsets"].tolist()
     with tempfile.TemporaryDirectory() as folder:
-        library = build_c(Path(folder))
+        libraries = [build_c(Path(folder), None), build_c(Path(folder), offsets)]
         for name, make in (("disc", disc), ("edges", edges), ("uniform", uniform)):
             events = make(args.events)
             for track in (False, True):
                 run_kernel(events[:10], config, motion, track)  # compile
-                ours, theirs = [], []
+                seconds: list[list[float]] = [[], [], []]
                 for _ in range(args.repeats):
-                    seconds, wanted = run_c(library, events, config, motion, track)
-                    theirs.append(seconds)
-                    seconds, found = run_kernel(events, config, motion, track)
-                    ours.append(seconds)
-                    if not np.array_equal(wanted, found):
-                        raise SystemExit(f"{name}: the kernel and the C code disagree")
-                fast, slow = len(events) / min(ours) / 1e6, len(events) / min(theirs) / 1e6
+                    taken, found = run_kernel(events, config, motion, track)
+                    seconds[2].append(taken)
+                    for library, times in zip(libraries, seconds[:2], strict=True):
+                        taken, wanted = run_c(library, events, config, motion, track)
+                        times.append(taken)
+                        if not np.array_equal(wanted, found):
+                            raise SystemExit(f"{name}: the kernel and the C code disagree")
+                rates = [len(events) / min(times) / 1e6 for times in seconds]
                 row = f"{name:9}{'yes' if track else 'no':>8}{found.mean():8.1%}"
-                sys.stdout.write(f"{row}{slow:10.1f}{fast:12.1f}{fast / slow:8.2f}\n")
+                row += "".join(f"{rate:12.1f}" for rate in rates)
+                sys.stdout.write(row + "".join(f"{rates[2] / rate:12.2f}" for rate in rates[:2]) + "\n")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 /* The rule of semantics.md in plain C over the same packed state: the yardstick for the kernel, one thread.
  *
- * Built and called by bench_canceller.py. Cells: t' << 2 | p << 1 | valid, t' in 30 bits from a base that the caller
+ * Built and called by bench_canceller.py, once with the window in a loop and once with WINDOW compiled in. Cells: t' << 2 | p << 1 | valid, t' in 30 bits from a base that the caller
  * keeps below 2^29 µs; a border as wide as the gate; offsets nearest first. */
 #include <stdint.h>
 
@@ -41,18 +41,36 @@ void cancel(int64_t n, const int64_t *t, const uint16_t *x, const uint16_t *y, c
         }
 
         const uint32_t want = ((now - gate_us) << 2) | (sign << 1) | 1u;
+        int32_t met = -1;
+#ifdef WINDOW /* the offsets themselves, as a list: unrolled by hand */
+        (void)offsets, (void)window;
+#define LOOK(offset)                                                                                                   \
+    {                                                                                                                  \
+        const uint32_t gap = cells[here + (offset)] - want;                                                            \
+        if (((gap >> 2) | (gap << 30)) <= twice) {                                                                     \
+            met = here + (offset);                                                                                     \
+            goto found;                                                                                                \
+        }                                                                                                              \
+    }
+        WINDOW
+#else
         for (int32_t k = 0; k < window; k++) {
-            const int32_t beside = here + offsets[k];
-            const uint32_t gap = cells[beside] - want;
+            const uint32_t gap = cells[here + offsets[k]] - want;
             if (((gap >> 2) | (gap << 30)) <= twice) {
-                cells[beside] = 0;
-                suppressed[i] = 1;
-                s.suppressed++;
-                if (source)
-                    source[i] = cell_source[beside];
-                break;
+                met = here + offsets[k];
+                goto found;
             }
         }
+#endif
+        goto predict;
+    found:
+        cells[met] = 0;
+        suppressed[i] = 1;
+        s.suppressed++;
+        if (source)
+            source[i] = cell_source[met];
+
+    predict:;
 
         const int64_t wide = x[i], tall = y[i];
         const int64_t ahead_x = ((wide << 16) + a * wide + b * tall + c) >> 16;

@@ -32,10 +32,11 @@ def test_columns_have_the_documented_types_and_cannot_be_written() -> None:
         e.width = 4  # type: ignore[misc]
 
 
-def test_the_callers_own_arrays_stay_writable() -> None:
-    t = np.array([1, 2, 3])
-    events(t=t)
-    t[0] = 0
+def test_the_callers_own_arrays_stay_writable_and_change_nothing() -> None:
+    x = np.array([0, 1, 2], np.uint16)
+    e = events(x=x)
+    x[0] = 9
+    assert e.x.tolist() == [0, 1, 2]
 
 
 @pytest.mark.parametrize(
@@ -105,6 +106,10 @@ def test_concatenate_joins_chunks_and_refuses_time_running_back() -> None:
     joined = Events.concatenate([e[:1], e[1:]])
     assert joined.t.tolist() == e.t.tolist()
     assert joined.label is not None
+    unlabelled = events()
+    assert Events.concatenate([unlabelled[:0], e]).label is not None
+    with pytest.raises(ValueError, match="either all chunks carry labels or none"):
+        Events.concatenate([unlabelled[:2], e[2:]])
     with pytest.raises(ValueError, match="must not decrease"):
         Events.concatenate([e[1:], e[:1]])
     with pytest.raises(ValueError, match="one sensor size"):

@@ -40,6 +40,7 @@ def run(args: argparse.Namespace) -> int:
 
     if args.target.exists() and args.source.exists() and args.target.samefile(args.source):
         raise ConfigError(f"{args.target} is the recording itself: write to another file")
+    notes: list[str] = []
     with reader_from(args, args.source) as reader:
         chunks: Iterable[Events] = [reader.read()] if args.sort else reader
         try:
@@ -53,15 +54,16 @@ def run(args: argparse.Namespace) -> int:
                 ) as writer,
                 event_progress("converting", None) as advance,
             ):
+                notes += writer.notes
                 for chunk in chunks:
                     if len(chunk):
                         writer.write(chunk)
                         advance(chunk)
         finally:
-            for note in reader.notes:
-                sys.stderr.write(f"{args.source}: {note}\n")
+            notes = [*reader.notes, *notes]
+            sys.stderr.writelines(f"note: {note}\n" for note in notes)
     sys.stderr.write(f"{writer.count:,} events written to {args.target} ({writer.format})\n")
     if args.json:
-        facts = {"out": str(args.target), "format": writer.format, "events": writer.count, "notes": list(reader.notes)}
+        facts = {"out": str(args.target), "format": writer.format, "events": writer.count, "notes": notes}
         sys.stdout.write(json.dumps(facts) + "\n")
     return 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import Any
 
 from tiegocancel.cli.settings import add_cancel_options, add_output_options, settings_from
@@ -58,7 +59,8 @@ def run(args: argparse.Namespace) -> int:
             width=scene.width,
             height=scene.height,
         )
-    session = Session(args, settings, title="Built-in scene: a textured disc and a mover", inputs=[])
+    inputs = [path for path in [Path(settings.motion.source)] if path.is_file()]
+    session = Session(args, settings, title="Built-in scene: a textured disc and a mover", inputs=inputs)
     return session.run(
         simulate(scene, duration_s=duration_s, seed=seed),
         trajectory,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import logging
 import os
+import re
 import sys
 from collections.abc import Sequence
 
@@ -19,7 +20,7 @@ OK, FAILED, USAGE, INTERRUPTED = 0, 1, 2, 130
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one verb and return the exit code: 0 ok, 1 failed, 2 usage or configuration, 130 interrupted."""
-    args = _parser().parse_args(argv)
+    args = _parser().parse_args(_joined(sys.argv[1:] if argv is None else argv))
     logging.basicConfig(
         stream=sys.stderr, level=logging.DEBUG if args.verbose else logging.WARNING, format="%(name)s: %(message)s"
     )
@@ -38,6 +39,17 @@ def main(argv: Sequence[str] | None = None) -> int:
         if args.verbose > 1:
             raise
         return _complain(_line(error), USAGE if isinstance(error, ConfigError) else FAILED)
+
+
+def _joined(argv: Sequence[str]) -> list[str]:
+    """Join ``--motion -300,60,0.3``: argparse takes a value that begins with a minus for a flag."""
+    words: list[str] = []
+    for word in argv:
+        if words and words[-1] == "--motion" and re.match(r"-[\d.]", word):
+            words[-1] = f"--motion={word}"
+        else:
+            words.append(word)
+    return words
 
 
 def _line(error: Exception) -> str:

@@ -48,9 +48,7 @@ def run(args: argparse.Namespace) -> int:
         trajectory, fit = trajectory_from(
             settings.motion.source, sample=lambda: _sample(reader), width=reader.width, height=reader.height
         )
-        session = Session(
-            args, settings, title=f"{args.source.name}", inputs=_inputs(args.source, settings.motion.source)
-        )
+        session = Session(args, settings, title=args.source.name, inputs=_inputs(args.source, settings.motion.source))
         return session.run(
             reader,
             trajectory,
@@ -73,11 +71,13 @@ def _sample(reader: EventReader) -> Events:
         for chunk in reader:
             parts.append(chunk)
             count += len(chunk)
-            if count >= SAMPLE_EVENTS:
+            if count > SAMPLE_EVENTS:
                 break
     except TiegoCancelError:
         if not count:
             raise
+    if count > SAMPLE_EVENTS:
+        reader.notes.append(f"the fit looks at the first {SAMPLE_EVENTS:,} events only")
     return Events.concatenate(parts)[:SAMPLE_EVENTS]
 
 

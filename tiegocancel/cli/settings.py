@@ -43,15 +43,17 @@ _KEYS = {
 def add_cancel_options(parser: argparse.ArgumentParser) -> None:
     """Add the canceller's parameters; a flag that is not given leaves the configuration file's value."""
     group = parser.add_argument_group("canceller")
-    group.add_argument("--horizon-us", type=int, metavar="US", help="how far ahead an event is predicted")
-    group.add_argument("--tolerance-us", type=int, metavar="US", help="temporal gate, ± and inclusive")
-    group.add_argument("--tolerance-px", type=float, metavar="PX", help="spatial gate, a radius, inclusive")
-    group.add_argument("--polarity", choices=("opposite", "equal", "ignore"), help="what the anti-event must oppose")
-    group.add_argument("--ring-capacity", type=int, metavar="N", help="pending predictions held at most")
+    group.add_argument("--horizon-us", type=int, metavar="US", help="how far ahead to predict (8000; demo 40000)")
+    group.add_argument("--tolerance-us", type=int, metavar="US", help="temporal gate, ± and inclusive (1000)")
+    group.add_argument("--tolerance-px", type=float, metavar="PX", help="spatial gate, a radius, inclusive (2)")
+    group.add_argument("--polarity", choices=("opposite", "equal", "ignore"), help="what an event may meet (opposite)")
+    group.add_argument("--ring-capacity", type=int, metavar="N", help="pending predictions (65536; demo 262144)")
     group.add_argument(
-        "--motion-path", choices=("integer", "float"), help="fixed-point schedule or interpolation at each event"
+        "--motion-path",
+        choices=("integer", "float"),
+        help="fixed-point schedule (default) or interpolation at each event",
     )
-    group.add_argument("--schedule-step-us", type=int, metavar="US", help="time from one schedule entry to the next")
+    group.add_argument("--schedule-step-us", type=int, metavar="US", help="time between schedule entries (1000)")
 
 
 def add_output_options(parser: argparse.ArgumentParser) -> None:
@@ -61,8 +63,8 @@ def add_output_options(parser: argparse.ArgumentParser) -> None:
         "--out", type=Path, default=Path("tiegocancel-out"), metavar="DIR", help="folder for all results"
     )
     group.add_argument("--json", action="store_true", help="print one JSON object on stdout")
-    group.add_argument("--residual", metavar="FORMAT", help="format of the residual events: npz, npy, csv, evt2, none")
-    group.add_argument("--disc-radius-px", type=float, metavar="PX", help="radius of the disc that turns")
+    group.add_argument("--residual", metavar="FORMAT", help="of residual events: npz (default), npy, csv, evt2, none")
+    group.add_argument("--disc-radius-px", type=float, metavar="PX", help="radius of the disc that turns (guessed)")
     group.add_argument("--no-controls", dest="controls", action="store_false", default=None, help="skip the controls")
     group.add_argument("--no-figures", dest="figures", action="store_false", default=None, help="skip the figures")
     group.add_argument("--shuffle-seed", type=int, metavar="N", help="seed of the time-shuffled control")

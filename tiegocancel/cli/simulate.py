@@ -61,6 +61,8 @@ def run(args: argparse.Namespace) -> int:
             writer.write(chunk)
             counts += np.bincount(np.asarray(chunk.label), minlength=len(LABELS))
             advance(chunk)
+    for note in writer.notes:
+        sys.stderr.write(f"note: {note}\n")
     ground_truth(scene, duration_s=duration_s).to_csv(motion_path)
     events, seconds = int(counts.sum()), time.perf_counter() - begin_s
     rate_hz = events / duration_s if duration_s else 0.0

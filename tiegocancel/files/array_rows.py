@@ -8,7 +8,7 @@ import struct
 import zipfile
 import zlib
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from pathlib import Path
 from typing import IO, Any
 
@@ -28,28 +28,34 @@ _MAX_BYTES = 1 << 24
 class ArrayRows:
     """One array; ``opener`` returns its bytes from the start, ``size_bytes`` says how many there are.
 
-    ``length`` rows of ``header.dtype``; a two-dimensional array has ``columns`` columns, others 0.
+    ``zipped`` says that they come out of a ZIP archive, whose faults are then told as such. ``length`` rows of
+    ``header.dtype``; a two-dimensional array has ``columns`` columns, others 0.
     """
 
-    def __init__(self, name: str | Path, opener: Callable[[], IO[bytes]], size_bytes: int) -> None:
+    def __init__(self, name: str | Path, opener: Callable[[], IO[bytes]], size_bytes: int, *, zipped: bool) -> None:
         self._name = name
         self._opener = opener
-        with zip_faults(name), opener() as source:
+        self._zipped = zipped
+        with self._faults(), opener() as source:
             self.header: NpyHeader = parse_header(name, source, size_bytes)
         if self.header.dtype.kind not in "biufV" or len(self.header.shape) not in (1, 2):
             raise self.header.refuse("expected numbers or structured rows in one or two dimensions")
         self.length = self.header.shape[0]
         self.columns = self.header.shape[1] if len(self.header.shape) == 2 else 0
 
+    def at_once(self, rows: int) -> int:
+        """Return how many of ``rows`` are read at a time: fewer where they are long."""
+        return max(1, min(rows, _MAX_BYTES // (self.header.dtype.itemsize * max(self.columns, 1))))
+
     def chunks(self, rows: int) -> Iterator[NDArray[Any]]:
-        """Yield consecutive rows, at most ``rows`` each; a source that ends early raises :class:`InputError`."""
+        """Yield consecutive rows, ``at_once(rows)`` each; a source that ends early raises :class:`InputError`."""
         strided = self.header.fortran and self.columns > 0
         row_bytes = self.header.dtype.itemsize * (1 if strided else max(self.columns, 1))
-        rows = max(1, min(rows, _MAX_BYTES // row_bytes))
+        rows = self.at_once(rows)
         with ExitStack() as stack:
             sources = []
             for column in range(self.columns if strided else 1):
-                with zip_faults(self._name):
+                with self._faults():
                     source = stack.enter_context(self._opener())
                     source.seek(self.header.data_offset + column * self.length * row_bytes)
                 sources.append(source)
@@ -63,16 +69,19 @@ class ArrayRows:
 
     def _part(self, source: IO[bytes], start: int, count: int, row_bytes: int) -> NDArray[Any]:
         """Read ``count`` rows from one source."""
-        with zip_faults(self._name):
+        with self._faults():
             data = source.read(count * row_bytes)
         if len(data) < count * row_bytes:
             at = self.header.data_offset + start * row_bytes + len(data)
             raise InputError(self._name, f"byte {at}", f"ends inside row {start + len(data) // row_bytes}")
         return np.frombuffer(data, self.header.dtype)
 
+    def _faults(self) -> AbstractContextManager[None]:
+        return zip_faults(self._name) if self._zipped else nullcontext()
+
 
 def read_scalar(name: str, opener: Callable[[], IO[bytes]], size_bytes: int) -> int:
-    """Return the one whole number that a small array holds."""
+    """Return the one whole number that a small array in a ZIP archive holds."""
     with zip_faults(name), opener() as source:
         header = parse_header(name, source, size_bytes)
         if math.prod(header.shape) != 1 or header.dtype.kind not in "iuf":

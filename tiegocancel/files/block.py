@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tiegocancel.events import EGO, MAX_TIME_US, NOISE
 
-__all__ = ["Block"]
+__all__ = ["Block", "place_namer"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,3 +64,8 @@ def _range_of(name: str, low: int, high: int, width: int, height: int) -> str:
     if name in "xy":
         return f"{low} to {high} on a sensor of {width}x{height} px"
     return "a time within ±2^60 µs" if name == "t" else f"{low} to {high}"
+
+
+def place_namer(unit: str, places: Sequence[int] | NDArray[Any]) -> Callable[[int], str]:
+    """Return a function that names the place of row ``i``: ``unit`` (row, byte) and ``places[i]``."""
+    return lambda row: f"{unit} {int(places[row])}"

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from tiegocancel.files.block import Block
+from tiegocancel.files.block import Block, place_namer
 from tiegocancel.files.prophesee_header import read_prophesee_header
 from tiegocancel.files.reader import EventReader
 from tiegocancel.files.source import open_source
@@ -62,7 +62,7 @@ class DatReader(EventReader):
                 (data & 0x3FFF).astype(np.uint16),
                 ((data >> 14) & 0x3FFF).astype(np.uint16),
                 polarity,
-                lambda row, offset=offset: f"byte {offset + _EVENT_BYTES * row}",  # type: ignore[misc]
+                place_namer("byte", range(offset, offset + _EVENT_BYTES * len(piece), _EVENT_BYTES)),
             )
             wrong = polarity > 1
             if not wrong.any():

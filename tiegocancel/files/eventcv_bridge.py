@@ -14,7 +14,7 @@ import numpy as np
 
 from tiegocancel.errors import InputError, MissingExtraError
 from tiegocancel.events import MAX_SIDE_PX
-from tiegocancel.files.block import Block
+from tiegocancel.files.block import Block, place_namer
 from tiegocancel.files.reader import EventReader
 from tiegocancel.files.values import RowMaker
 
@@ -69,7 +69,7 @@ class EventcvReader(EventReader):
                 if rows.shape != (stop - start, 4):
                     raise self.fail(f"row {start}", f"eventcv gave {len(rows)} of {stop - start} events")
                 x, y, t, p = rows.T
-                block, fault = maker.block(t, x, y, p, lambda i, at=start: f"row {at + i}")  # type: ignore[misc]
+                block, fault = maker.block(t, x, y, p, place_namer("row", range(start, stop)))
                 yield block
                 if fault is not None:
                     raise fault

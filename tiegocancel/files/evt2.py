@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from tiegocancel.errors import ConfigError
 from tiegocancel.events import Events
 from tiegocancel.files.block import Block
-from tiegocancel.files.prophesee_header import read_prophesee_header
-from tiegocancel.files.reader import EventReader
+from tiegocancel.files.prophesee_raw import PropheseeRawReader
 from tiegocancel.files.words import words
 from tiegocancel.files.writer import EventWriter
 
@@ -28,7 +27,7 @@ _BLOCK_WORDS = 1 << 16
 _WORD = np.dtype("<u4")
 
 
-class Evt2Reader(EventReader):
+class Evt2Reader(PropheseeRawReader):
     """Decode EVT 2.0: bits 31–28 are the type; 0 OFF and 1 ON hold 6 bits of time, 11 of x, 11 of y.
 
     Type 8 carries time bits 33–6, whose wraps every 2^34 µs are followed. Words before the first of these have no
@@ -36,15 +35,7 @@ class Evt2Reader(EventReader):
     """
 
     format: ClassVar[str] = "evt2"
-
-    def _open(self) -> None:
-        header = read_prophesee_header(self.path)
-        if header.encoding not in ("evt2", ""):
-            raise self.fail("header", f"says encoding {header.encoding!r}, expected EVT 2.0")
-        self._offset = header.data_offset
-        self._size_of_file = header.size
-        if header.size is not None and "plug-in" in header.size_source:
-            self.note(f"sensor size {header.size[0]}x{header.size[1]} from the {header.size_source}")
+    encoding: ClassVar[str] = "EVT 2.0"
 
     def _blocks(self) -> Iterator[Block]:
         base_us, high, loops, without_time = -1, 0, 0, 0
@@ -100,6 +91,7 @@ class Evt2Writer(EventWriter):
 
     format: ClassVar[str] = "evt2"
     holds_labels: ClassVar[bool] = False
+    holds_size: ClassVar[bool] = True
 
     def _begin(self) -> None:
         if max(self.width, self.height) > 2048:

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiegocancel.files.block import Block
-from tiegocancel.files.prophesee_header import read_prophesee_header
-from tiegocancel.files.reader import EventReader
+from tiegocancel.files.prophesee_raw import PropheseeRawReader
 from tiegocancel.files.words import words
 
 __all__ = ["Evt3Reader"]
@@ -53,7 +52,7 @@ class _State:
     polarity: int = 0
 
 
-class Evt3Reader(EventReader):
+class Evt3Reader(PropheseeRawReader):
     """Decode EVT 3.0: bits 15–12 are the type, and time, row and vector base hold until the next word of their kind.
 
     Times wrap every 2^24 µs, which is followed; TIME_HIGH sets the lower bits to 0 until the next TIME_LOW. Events
@@ -62,15 +61,7 @@ class Evt3Reader(EventReader):
     """
 
     format: ClassVar[str] = "evt3"
-
-    def _open(self) -> None:
-        header = read_prophesee_header(self.path)
-        if header.encoding not in ("evt3", ""):
-            raise self.fail("header", f"says encoding {header.encoding!r}, expected EVT 3.0")
-        self._offset = header.data_offset
-        self._size_of_file = header.size
-        if header.size is not None and "plug-in" in header.size_source:
-            self.note(f"sensor size {header.size[0]}x{header.size[1]} from the {header.size_source}")
+    encoding: ClassVar[str] = "EVT 3.0"
 
     def _blocks(self) -> Iterator[Block]:
         state, left_out = _State(), 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from itertools import repeat
 from pathlib import Path
 from typing import IO, Any, ClassVar
 
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from tiegocancel.errors import ConfigError, InputError
 from tiegocancel.events import EVENT_DTYPE, Events
 from tiegocancel.files.array_rows import ArrayRows
-from tiegocancel.files.block import Block
+from tiegocancel.files.block import Block, place_namer
 from tiegocancel.files.npy_header import HEADER_BYTES, header_bytes
 from tiegocancel.files.options import ReadOptions
 from tiegocancel.files.reader import EventReader
@@ -39,8 +40,8 @@ class NpyReader(EventReader):
 
     Plain columns need the time unit declared; their order is declared or decided by content. The thesis's slice,
     float (N, 5) of x, y, p, t in s and a flag, keeps the rows with flag 0: flag 1 marks its predictions. Rows are
-    read a block at a time, so memory does not grow with the file. ``opener`` and ``size_bytes`` name another
-    source than the whole file.
+    read a block at a time, so memory does not grow with the file. ``opener`` and ``size_bytes`` name a member of
+    a ZIP archive instead of the whole file.
     """
 
     format: ClassVar[str] = "npy"
@@ -52,12 +53,14 @@ class NpyReader(EventReader):
         opener: Callable[[], IO[bytes]] | None = None,
         size_bytes: int = 0,
     ) -> None:
+        self._zipped = opener is not None
         self._opener = opener or (lambda: open_source(path))
         self._bytes = size_bytes if opener else source_bytes(path)
         super().__init__(path, options)
 
     def _open(self) -> None:
-        self._rows = ArrayRows(self.path, self._opener, self._bytes)
+        self._rows = ArrayRows(self.path, self._opener, self._bytes, zipped=self._zipped)
+        self._label_rows: ArrayRows | None = None
         if self._rows.header.dtype.names:
             self._open_structured()
         elif 4 <= self._rows.columns <= _MAX_COLUMNS and self._rows.header.dtype.kind in "biuf":
@@ -80,7 +83,7 @@ class NpyReader(EventReader):
         if self.options.time_unit is not None:
             self.time_unit = self.options.time_unit
             self.note(f"time unit: {self.time_unit}, as declared")
-        elif kinds["t"] != "f":
+        elif kinds["t"] != "f" or not self._rows.length:
             self.note("time unit: us, as whole numbers in structured rows are")
         else:
             raise self._needs_unit(dtype[self._fields["t"]])
@@ -101,6 +104,11 @@ class NpyReader(EventReader):
             raise ConfigError(
                 f"columns {self._order!r} name {len(self._order)}, and {self.path} has {self._rows.columns}"
             )
+        if not self._rows.length and not (self._order and self.options.time_unit):
+            # Without events, neither the order nor the unit matters.
+            self._order = self._order or "txyp"
+            self.time_unit = self.options.time_unit or "us"
+            return
         if not self._order:
             self._order = self._decided(sample)
             self.note(f"columns {','.join(self._order)}, decided by content")
@@ -129,23 +137,24 @@ class NpyReader(EventReader):
 
     def _blocks(self) -> Iterator[Block]:
         maker = RowMaker(self.path, self.time_unit)
-        start = 0
-        for rows in self._rows.chunks(_BLOCK_ROWS):
-            label = None
+        start, count = 0, self._rows.at_once(_BLOCK_ROWS)
+        labels: Iterator[NDArray[Any] | None] = self._label_rows.chunks(count) if self._label_rows else repeat(None)
+        for rows, label in zip(self._rows.chunks(count), labels, strict=False):
             index = np.arange(start, start + len(rows))
             start += len(rows)
             if rows.dtype.names:
                 t, x, y, p = (rows[self._fields[key]] for key in "txyp")
-                label = rows[self._fields["label"]] if self._fields["label"] else None
+                label = rows[self._fields["label"]] if self._fields["label"] else label
             else:
                 if self._flagged:
                     wrong = ~np.isin(rows[:, 4], (0.0, 1.0))
                     if wrong.any():
                         row = int(np.argmax(wrong))
                         raise self.fail(f"row {index[row]}", f"flag is {rows[row, 4]}, expected 0 or 1")
-                    rows, index = rows[rows[:, 4] == 0], index[rows[:, 4] == 0]
+                    kept = rows[:, 4] == 0
+                    rows, index, label = rows[kept], index[kept], None if label is None else label[kept]
                 t, x, y, p = (rows[:, self._order.index(key)] for key in "txyp")
-            block, fault = maker.block(t, x, y, p, lambda i, at=index: f"row {at[i]}", label)  # type: ignore[misc]
+            block, fault = maker.block(t, x, y, p, place_namer("row", index), label)
             yield block
             if fault is not None:
                 raise fault
@@ -160,6 +169,7 @@ class NpyWriter(EventWriter):
 
     format: ClassVar[str] = "npy"
     holds_labels: ClassVar[bool] = False
+    holds_size: ClassVar[bool] = False
 
     def _begin(self) -> None:
         self._file = self.path.open("wb")

@@ -11,6 +11,7 @@ from typing import IO, Any
 import numpy as np
 
 from tiegocancel.errors import InputError
+from tiegocancel.files.short import short
 
 __all__ = ["HEADER_BYTES", "MAGIC", "NpyHeader", "header_bytes", "parse_header"]
 
@@ -18,6 +19,8 @@ MAGIC = b"\x93NUMPY"
 HEADER_BYTES = 256
 """Size of the headers written here: room for any count, so that it can be brought up to date in place."""
 _MAX_HEADER_BYTES = 65_536
+_MAX_DIMENSIONS = 64
+_MAX_SIDE = (1 << 63) - 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +39,7 @@ class NpyHeader:
     def refuse(self, problem: str) -> InputError:
         """Return the error for an array that is sound but not what was expected."""
         return InputError(
-            self.name, "header", f"array of shape {_short(self.shape)} and type {_short(self.dtype)}: {problem}"
+            self.name, "header", f"array of shape {short(self.shape)} and type {short(self.dtype)}: {problem}"
         )
 
 
@@ -71,10 +74,21 @@ def parse_header(name: str | Path, source: IO[bytes], size_bytes: int) -> NpyHea
             and isinstance(fortran, bool)
             and all(isinstance(side, int) and not isinstance(side, bool) and side >= 0 for side in shape)
         )
-    except (ValueError, SyntaxError, TypeError, KeyError, IndexError, AttributeError, RecursionError, MemoryError):
+    except (
+        ValueError,
+        SyntaxError,
+        TypeError,
+        LookupError,
+        AttributeError,
+        OverflowError,
+        RecursionError,
+        MemoryError,
+    ):
         sound = False
     if not sound:
         raise wrong("header", "expected a dictionary with descr, fortran_order and shape")
+    if len(shape) > _MAX_DIMENSIONS or any(side > _MAX_SIDE for side in shape):
+        raise wrong("header", f"absurd shape, expected at most {_MAX_DIMENSIONS} dimensions below 2^63")
     if dtype.hasobject:
         raise wrong("header", "holds Python objects, which are never unpickled; expected numbers")
     offset = 8 + length_bytes + length
@@ -82,8 +96,8 @@ def parse_header(name: str | Path, source: IO[bytes], size_bytes: int) -> NpyHea
     if dtype.itemsize == 0 or offset + needed > size_bytes:
         raise wrong(
             f"byte {size_bytes}",
-            f"ends after {size_bytes - offset} bytes of data, expected {needed} "
-            f"for shape {_short(shape)} of {_short(dtype)}",
+            f"ends after {size_bytes - offset} bytes of data, expected {short(needed)} "
+            f"for shape {short(shape)} of {short(dtype)}",
         )
     return NpyHeader(str(name), shape, fortran, dtype, offset)
 
@@ -96,9 +110,3 @@ def header_bytes(dtype: np.dtype[Any], count: int) -> bytes:
     if len(text) >= room:
         raise ValueError(f"dtype {dtype} needs a header of {len(text)} bytes, and there is room for {room - 1}")
     return MAGIC + b"\x01\x00" + room.to_bytes(2, "little") + text.ljust(room - 1) + b"\n"
-
-
-def _short(value: object) -> str:
-    """Print a shape or a type in one short piece, however absurd it is."""
-    text = " ".join(str(value).split())
-    return text if len(text) <= 80 else text[:77] + "..."

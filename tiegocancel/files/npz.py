@@ -10,15 +10,15 @@ from typing import IO, Any, BinaryIO, ClassVar
 
 import numpy as np
 
-from tiegocancel.errors import ConfigError
+from tiegocancel.errors import ConfigError, InputError
 from tiegocancel.events import Events
 from tiegocancel.files.array_rows import ArrayRows, read_scalar, zip_faults
-from tiegocancel.files.block import Block
+from tiegocancel.files.block import Block, place_namer
 from tiegocancel.files.npy import NpyReader
 from tiegocancel.files.npy_header import HEADER_BYTES, header_bytes
 from tiegocancel.files.options import ReadOptions
 from tiegocancel.files.reader import EventReader
-from tiegocancel.files.source import open_source
+from tiegocancel.files.source import open_source, source_bytes
 from tiegocancel.files.values import RowMaker
 from tiegocancel.files.writer import EventWriter
 
@@ -27,14 +27,15 @@ __all__ = ["NpzReader", "NpzWriter", "open_npz"]
 _BLOCK_ROWS = 1 << 16
 _COPY_ROWS = 1 << 18
 _MAX_SPOOLS = 100
+_EXTRAS = {"width", "height", "label"}
 
 
 def open_npz(path: Path, options: ReadOptions) -> EventReader:
-    """Open an archive of the columns ``t x y p``, or of a single array that is read as an NPY."""
+    """Open an archive of the columns ``t x y p``, or of a single array of rows; both may have what goes with them."""
     members = _members(path)
-    if len(members) == 1 and "t" not in members:
-        name = next(iter(members))
-        return NpyReader(path, options, _opener(path, name), members[name])
+    events = [name for name in members if name not in _EXTRAS]
+    if len(events) == 1 and events != ["t"]:
+        return NpzRowsReader(path, options, events[0], members)
     return NpzReader(path, options)
 
 
@@ -54,21 +55,17 @@ class NpzReader(EventReader):
             raise self.fail("", f"expected the arrays t, x, y, p in the archive, found {found}")
         self.labelled = "label" in members
         names = ("t", "x", "y", "p", "label") if self.labelled else ("t", "x", "y", "p")
-        self._columns = {
-            name: ArrayRows(f"{self.path}({name}.npy)", _opener(self.path, name), members[name]) for name in names
-        }
+        self._columns = {name: _array(self.path, name, members) for name in names}
         lengths = {name: rows.length for name, rows in self._columns.items()}
         if len(set(lengths.values())) > 1:
             raise self.fail("", f"arrays must have one length, not {lengths}")
         for name, rows in self._columns.items():
             if rows.columns or rows.header.dtype.kind not in ("iuf" if name == "t" else "biuf"):
                 raise rows.header.refuse("expected one number an event")
-        if "width" in members and "height" in members:
-            self._size_of_file = (self._scalar("width", members), self._scalar("height", members))
-        self._declare_unit(self._columns["t"].header.dtype.kind == "f")
-
-    def _scalar(self, name: str, members: dict[str, int]) -> int:
-        return read_scalar(f"{self.path}({name}.npy)", _opener(self.path, name), members[name])
+        self._size_of_file = _size(self.path, members)
+        times = self._columns["t"]
+        # NumPy's empty arrays are floats; without events there is no unit to declare.
+        self._declare_unit(times.header.dtype.kind == "f" and times.length > 0)
 
     def _declare_unit(self, fractional: bool) -> None:
         """Set the unit of time."""
@@ -86,11 +83,37 @@ class NpzReader(EventReader):
         for parts in zip(*(rows.chunks(_BLOCK_ROWS) for rows in self._columns.values()), strict=True):
             t, x, y, p = parts[:4]
             label = parts[4] if "label" in self._columns else None
-            block, fault = maker.block(t, x, y, p, lambda i, at=start: f"row {at + i}", label)  # type: ignore[misc]
+            block, fault = maker.block(t, x, y, p, place_namer("row", range(start, start + len(t))), label)
             start += len(t)
             yield block
             if fault is not None:
                 raise fault
+
+
+class NpzRowsReader(NpyReader):
+    """Read the one array of rows ``name`` as :class:`NpyReader` does, with ``width``, ``height`` and ``label`` [n].
+
+    ``members`` are the arrays of the archive with their sizes in bytes. Labels within the rows come first.
+    """
+
+    format: ClassVar[str] = "npz"
+
+    def __init__(self, path: Path, options: ReadOptions, name: str, members: dict[str, int]) -> None:
+        self._members = members
+        super().__init__(path, options, _opener(path, name), members[name])
+
+    def _open(self) -> None:
+        super()._open()
+        self._size_of_file = _size(self.path, self._members)
+        if "label" not in self._members:
+            return
+        if self.labelled:
+            self.note("the array label is not used: the rows hold labels")
+            return
+        labels = _array(self.path, "label", self._members)
+        if labels.columns or labels.header.dtype.kind not in "biuf" or labels.length != self._rows.length:
+            raise labels.header.refuse(f"expected one number for each of {self._rows.length} rows")
+        self._label_rows, self.labelled = labels, True
 
 
 class NpzWriter(EventWriter):
@@ -103,6 +126,7 @@ class NpzWriter(EventWriter):
 
     format: ClassVar[str] = "npz"
     holds_labels: ClassVar[bool] = True
+    holds_size: ClassVar[bool] = True
 
     def _begin(self) -> None:
         fields: list[tuple[str, str]] = [("t", "<i8"), ("x", "<u2"), ("y", "<u2"), ("p", "u1")]
@@ -136,6 +160,11 @@ class NpzWriter(EventWriter):
                 part.unlink(missing_ok=True)
         self._spool_path.unlink()
 
+    def _abandon(self) -> None:
+        """Remove the spool; a recording that was to be replaced stays."""
+        self._spool.close()
+        self._spool_path.unlink()
+
     def _copy_column(self, archive: zipfile.ZipFile, name: str) -> None:
         """Copy one field of the spool into the archive, some rows at a time."""
         dtype = self._dtype[name]
@@ -157,12 +186,38 @@ def _new_spool(path: Path) -> tuple[Path, BinaryIO]:
 
 def _members(path: Path) -> dict[str, int]:
     """Return the arrays of an archive with their sizes in bytes."""
-    with zip_faults(path), open_source(path) as source, zipfile.ZipFile(source) as archive:
-        return {
-            info.filename.removesuffix(".npy"): info.file_size
-            for info in archive.infolist()
-            if info.filename.endswith(".npy")
-        }
+    with zip_faults(path), open_source(path) as source:
+        try:
+            archive = zipfile.ZipFile(source)
+        except zipfile.BadZipFile:
+            raise InputError(
+                path,
+                f"byte {source_bytes(path)}",
+                "torn archive: its table of contents, which comes last, is missing or broken. No row can be kept, not "
+                "with --keep-going either: the columns lie one after the other. "
+                f"A run that was killed leaves its rows in {path.name}.spool.npy",
+            ) from None
+        with archive:
+            return {
+                info.filename.removesuffix(".npy"): info.file_size
+                for info in archive.infolist()
+                if info.filename.endswith(".npy")
+            }
+
+
+def _array(path: Path, name: str, members: dict[str, int]) -> ArrayRows:
+    """Open one array of an archive for reading rows."""
+    return ArrayRows(f"{path}({name}.npy)", _opener(path, name), members[name], zipped=True)
+
+
+def _size(path: Path, members: dict[str, int]) -> tuple[int, int] | None:
+    """Return the sensor's size where an archive holds it."""
+    if "width" not in members or "height" not in members:
+        return None
+    width, height = (
+        read_scalar(f"{path}({name}.npy)", _opener(path, name), members[name]) for name in ("width", "height")
+    )
+    return width, height
 
 
 def _opener(path: Path, name: str) -> Callable[[], IO[bytes]]:

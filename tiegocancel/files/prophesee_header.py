@@ -7,12 +7,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from tiegocancel.errors import InputError
+from tiegocancel.files.short import short
 from tiegocancel.files.source import first_bytes
 
 __all__ = ["PropheseeHeader", "parse_prophesee_header", "read_prophesee_header"]
 
 _MAX_HEADER_BYTES = 65_536
 _MAX_LINE_BYTES = 4096
+_MAX_SIZE_DIGITS = 9
 
 _SENSOR_SIZES = {
     "gen3": (640, 480),
@@ -41,10 +44,11 @@ class PropheseeHeader:
     size_source: str
 
 
-def parse_prophesee_header(start: bytes) -> PropheseeHeader:
+def parse_prophesee_header(path: Path, start: bytes) -> PropheseeHeader:
     """Read the lines that begin with ``%``, at most 64 KiB; a file without any has an empty header.
 
     Data may begin with the byte of ``%`` too: a header line is printable text, and ``% end`` is the last one.
+    A size of more than 9 digits raises :class:`InputError`.
     """
     fields: dict[str, str] = {}
     offset = 0
@@ -64,13 +68,13 @@ def parse_prophesee_header(start: bytes) -> PropheseeHeader:
             fields["data file"] = text
         else:
             fields[key.lower().rstrip(":")] = value.strip()
-    size, size_source = _size(fields)
+    size, size_source = _size(path, fields)
     return PropheseeHeader(fields, offset, _encoding(fields), size, size_source)
 
 
 def read_prophesee_header(path: Path) -> PropheseeHeader:
     """Read the header of a file."""
-    return parse_prophesee_header(first_bytes(path, _MAX_HEADER_BYTES))
+    return parse_prophesee_header(path, first_bytes(path, _MAX_HEADER_BYTES))
 
 
 def _encoding(fields: Mapping[str, str]) -> str:
@@ -85,16 +89,19 @@ def _encoding(fields: Mapping[str, str]) -> str:
     return ""
 
 
-def _size(fields: Mapping[str, str]) -> tuple[tuple[int, int] | None, str]:
+def _size(path: Path, fields: Mapping[str, str]) -> tuple[tuple[int, int] | None, str]:
     """Find the sensor's size: format options, geometry, separate lines, at last the plug-in's name."""
     options = dict(part.split("=", 1) for part in fields.get("format", "").split(";")[1:] if "=" in part)
-    if options.get("width", "").isdecimal() and options.get("height", "").isdecimal():
-        return (int(options["width"]), int(options["height"])), "header line format"
-    geometry = re.fullmatch(r"(\d{1,6})x(\d{1,6})", fields.get("geometry", ""))
-    if geometry:
-        return (int(geometry[1]), int(geometry[2])), "header line geometry"
-    if fields.get("width", "").isdecimal() and fields.get("height", "").isdecimal():
-        return (int(fields["width"]), int(fields["height"])), "header lines width and height"
+    geometry = fields.get("geometry", "").partition("x")
+    for width, height, source in (
+        (options.get("width", ""), options.get("height", ""), "header line format"),
+        (geometry[0], geometry[2], "header line geometry"),
+        (fields.get("width", ""), fields.get("height", ""), "header lines width and height"),
+    ):
+        if width.isdecimal() and height.isdecimal():
+            if max(len(width), len(height)) > _MAX_SIZE_DIGITS:
+                raise InputError(path, "header", f"sensor size is {short(f'{width} x {height}')}, expected px")
+            return (int(width), int(height)), source
     for part in re.split(r"[^a-z0-9]+", fields.get("plugin_name", "").lower()):
         if part in _SENSOR_SIZES:
             return _SENSOR_SIZES[part], f"plug-in name {fields['plugin_name']}"

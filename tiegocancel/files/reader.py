@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from pathlib import Path
 from types import TracebackType
 from typing import ClassVar, Self
@@ -15,6 +15,7 @@ from tiegocancel.events import MAX_SIDE_PX, Events
 from tiegocancel.files.block import Block
 from tiegocancel.files.options import ReadOptions
 from tiegocancel.files.order import ReorderWindow
+from tiegocancel.files.short import short
 from tiegocancel.files.sidecar import Labels, labels_beside
 
 __all__ = ["EventReader"]
@@ -42,7 +43,7 @@ class EventReader(ABC):
         self.time_unit = "us"
         self._size_of_file: tuple[int, int] | None = None
         self._labels: Labels | None = None
-        self._running: list[Iterator[Events]] = []
+        self._running: list[Generator[Events, None, None]] = []
         self._open()
         if options.time_unit not in (None, self.time_unit):
             self.note(
@@ -76,7 +77,7 @@ class EventReader(ABC):
     def close(self) -> None:
         """End iterations that are under way and close their files."""
         for chunks in self._running:
-            chunks.close()  # type: ignore[attr-defined]  # generators, as __iter__ makes them
+            chunks.close()
         self._running.clear()
 
     def __iter__(self) -> Iterator[Events]:
@@ -114,7 +115,7 @@ class EventReader(ABC):
         """Return the error for a fault at ``where``."""
         return InputError(self.path, where, problem)
 
-    def _chunks(self) -> Iterator[Events]:
+    def _chunks(self) -> Generator[Events, None, None]:
         """Decode, check, put in order and cut into chunks."""
         window = ReorderWindow(self.options.chunk_events)
         self.faults, fault, kept = 0, None, 0
@@ -161,7 +162,7 @@ class EventReader(ABC):
             known = self._size_of_file
             for name, side in (("width", known[0]), ("height", known[1])):
                 if not 1 <= side <= MAX_SIDE_PX:
-                    raise self.fail("header", f"{name} is {side}, expected 1 to {MAX_SIDE_PX} px")
+                    raise self.fail("header", f"{name} is {short(side)}, expected 1 to {MAX_SIDE_PX} px")
             width, height = width or known[0], height or known[1]
             if (width, height) != known:
                 self.note(f"sensor size {width}x{height} as declared, although the file says {known[0]}x{known[1]}")

@@ -38,7 +38,7 @@ def sniff(path: Path) -> str:
         version = start[9:12].decode("ascii", "replace")
         raise InputError(path, "byte 9", f"AEDAT version {version!r} is not read, expected 2.0 or 4.0")
     if start.startswith(b"%"):
-        encoding = parse_prophesee_header(start).encoding
+        encoding = parse_prophesee_header(path, start).encoding
         if encoding in _ENCODINGS:
             return _ENCODINGS[encoding]
         if encoding in ("evt21", "evt4"):

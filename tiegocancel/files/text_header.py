@@ -13,6 +13,7 @@ __all__ = ["MAX_LINE_BYTES", "NUMBER", "TextHeader", "read_text_header", "split_
 
 MAX_LINE_BYTES = 1 << 16
 _MAX_HEADER_LINES = 1000
+_MAX_SIZE_DIGITS = 9
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
 _COLUMN_NAMES = {
@@ -69,6 +70,10 @@ def read_text_header(path: Path) -> TextHeader:
             fields, delimiter = split_row(text.lstrip("#%").strip() if comment else text)
             if not comment and fields and all(NUMBER.fullmatch(field) for field in fields):
                 if len(fields) == 2 and size is None and all(field.isdecimal() for field in fields):
+                    if max(map(len, fields)) > _MAX_SIZE_DIGITS:
+                        raise InputError(
+                            path, f"row {number}", f"found {text[:40]!r}, expected a sensor size or rows of t, x, y, p"
+                        )
                     size = (int(fields[0]), int(fields[1]))
                 else:
                     mark = len(_BYTE_ORDER_MARK) if line.startswith(_BYTE_ORDER_MARK) else 0

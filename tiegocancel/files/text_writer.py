@@ -21,6 +21,7 @@ class CsvWriter(EventWriter):
 
     format: ClassVar[str] = "csv"
     holds_labels: ClassVar[bool] = False
+    holds_size: ClassVar[bool] = False
 
     def _begin(self) -> None:
         self._file = self.path.open("w", encoding="ascii", newline="\n")

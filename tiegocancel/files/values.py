@@ -51,8 +51,8 @@ class RowMaker:
                 # A file may hold any byte where a truth value is meant.
                 column = column.view(np.uint8)
             values, wrong = _times_us(column, self._unit) if name == "t" else _whole(column)
-            if name == "p" and wrong is None:
-                values, wrong = self._polarity(values)
+            if name == "p":
+                values, wrong = self._polarity(values, wrong)
             converted[name] = values
             if wrong is not None:
                 row = int(np.argmax(wrong))
@@ -63,14 +63,21 @@ class RowMaker:
         row, problem = min(faults)
         return block.head(row), InputError(self._path, where(row), problem)
 
-    def _polarity(self, values: NDArray[Any]) -> _Checked:
-        """Map {0, 1} or {−1, 1} to {0, 1}; the first value below 1 decides which of the two the file uses."""
+    def _polarity(self, values: NDArray[Any], fraction: NDArray[np.bool_] | None) -> _Checked:
+        """Map {0, 1} or {−1, 1} to {0, 1}; the first value below 1 decides which of the two the file uses.
+
+        Rows where ``fraction`` [n] is set hold no whole number: they are wrong, and decide nothing.
+        """
+        if fraction is not None:
+            values = np.where(fraction, 1, values)
         low = values < 1
         if self._off is None and low.any():
             self._off = int(values[np.argmax(low)])
         wrong = (values > 1) | (values < -1)
         if self._off is not None:
             wrong |= low & (values != self._off)
+        if fraction is not None:
+            wrong |= fraction
         return (values > 0).astype(np.uint8), wrong if wrong.any() else None
 
 
@@ -90,8 +97,9 @@ def _times_us(values: NDArray[Any], unit: str) -> _Checked:
     the float (2^-22 s) and half a step of the product (2^-2 µs) stay below half a microsecond.
     """
     if values.dtype.kind == "f":
-        scaled = values.astype(np.float64)
-        scaled = scaled / 1_000 if unit == "ns" else scaled * MICROSECONDS[unit]
+        scaled = _doubles(values)
+        with np.errstate(over="ignore"):
+            scaled = scaled / 1_000 if unit == "ns" else scaled * MICROSECONDS[unit]
         wrong = ~(np.abs(scaled) <= MAX_TIME_US)
         if wrong.any():
             return np.rint(np.where(wrong, 0, scaled)).astype(np.int64), wrong
@@ -111,11 +119,18 @@ def _whole(values: NDArray[Any]) -> _Checked:
     """Convert floats that are whole to int64; integers stay as they are."""
     if values.dtype.kind != "f":
         return values, None
-    wrong = ~(np.abs(values) <= 2**31)
-    wrong |= values != np.floor(values)
+    numbers = _doubles(values)
+    wrong = ~(np.abs(numbers) <= 2**31)
+    wrong |= numbers != np.floor(numbers)
     if wrong.any():
-        return np.where(wrong, 0, values).astype(np.int64), wrong
-    return values.astype(np.int64), None
+        return np.where(wrong, 0, numbers).astype(np.int64), wrong
+    return numbers.astype(np.int64), None
+
+
+def _doubles(values: NDArray[Any]) -> NDArray[np.float64]:
+    """Widen floats, so that no bound overflows their type; one that is wider and too large becomes infinite."""
+    with np.errstate(over="ignore"):
+        return values.astype(np.float64, copy=False)
 
 
 def decide_columns(sample: NDArray[Any]) -> str:
@@ -124,11 +139,11 @@ def decide_columns(sample: NDArray[Any]) -> str:
     A candidate needs coordinates that are whole and below 65536 and polarities of {0, 1} or {−1, 1}; if both
     candidates pass, only one may have times that never decrease. Otherwise raise :class:`UndecidedError`.
     """
+    if sample.dtype.kind == "f":
+        sample = _doubles(sample)
     passing = [order for order in ("xypt", "txyp") if _could_be(sample, order)]
     if len(passing) == 2:
-        passing = [
-            order for order in passing if bool((np.diff(sample[:, order.index("t")]) >= 0).all()) and len(sample) > 1
-        ]
+        passing = [order for order in passing if len(sample) > 1 and _never_decreases(sample[:, order.index("t")])]
     if len(passing) != 1:
         found = "both orders x,y,p,t and t,x,y,p fit" if passing else "neither order x,y,p,t nor t,x,y,p fits"
         raise UndecidedError(f"{found} the first {len(sample)} rows")
@@ -141,3 +156,8 @@ def _could_be(sample: NDArray[Any], order: str) -> bool:
     sides = sample[:, [order.index("x"), order.index("y")]]
     coordinates = bool(((sides >= 0) & (sides < 65_536)).all()) and bool((sides == np.floor(sides)).all())
     return coordinates and (polarity <= {0, 1} or polarity <= {-1, 1})
+
+
+def _never_decreases(times: NDArray[Any]) -> bool:
+    """Compare neighbours: a difference of unsigned numbers would wrap."""
+    return bool((times[1:] >= times[:-1]).all())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import ClassVar, Self
@@ -18,14 +19,16 @@ class EventWriter(ABC):
 
     ``width`` and ``height`` in px are those of every chunk. With ``labelled`` every chunk carries labels; a format
     that cannot hold them gets them beside it, as ``NAME.labels.npy``. Without it labels are left out. Leaving the
-    ``with`` block, also by an exception, finalises what was written; what a killed process leaves is said by each
-    format. ``count`` is the number of events written.
+    ``with`` block, also by an exception, finalises what was written; an exception before the first event leaves no
+    file. What a killed process leaves is said by each format. ``count`` is the number of events written.
 
+    ``holds_labels`` and ``holds_size`` say whether the format has a place for labels and for the sensor's size.
     A format implements :meth:`_begin`, :meth:`_append` and :meth:`_finish`.
     """
 
     format: ClassVar[str]
     holds_labels: ClassVar[bool]
+    holds_size: ClassVar[bool]
 
     def __init__(self, path: Path, *, width: int, height: int, labelled: bool = False) -> None:
         for name, side in (("width", width), ("height", height)):
@@ -55,12 +58,33 @@ class EventWriter(ABC):
     def _finish(self) -> None:
         """Finalise and close the file."""
 
+    def _abandon(self) -> None:
+        """Close the file and remove it."""
+        with suppress(OSError):
+            self._finish()
+        # What is no regular file, such as /dev/null, was not created here.
+        if self.path.is_file():
+            self.path.unlink()
+
+    @property
+    def notes(self) -> list[str]:
+        """What a user of the file must be told."""
+        if self.holds_size:
+            return []
+        return [f"{self.format} holds no sensor size: pass --width {self.width} --height {self.height} when reading it"]
+
     def __enter__(self) -> Self:
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        if kind is not None and not self.count and not self._closed:
+            self._closed = True
+            if self._beside is not None:
+                self._beside.close()
+                labels_path(self.path).unlink(missing_ok=True)
+            self._abandon()
         self.close()
 
     def write(self, events: Events) -> None:

@@ -144,13 +144,13 @@ class Canceller:
             ahead = self._ahead(events) if isinstance(self.motion, RotationTrajectory) else self._unused
             for first, last, base_us in self._launches(events.t):
                 self._launch(events, first, last, ahead, suppressed, source, base_us=base_us)
+                self._last_us = int(events.t[last - 1])
         return Decisions(suppressed=suppressed.view(np.bool_), source=source if self.track_source else None)
 
     def _check_order(self, events: Events) -> None:
         """Refuse a chunk from before the last one: times never decrease in a stream."""
         if self._last_us is not None and int(events.t[0]) < self._last_us:
             raise ValueError(f"the chunk begins at {events.t[0]} µs, before the last event at {self._last_us} µs")
-        self._last_us = int(events.t[-1])
 
     def _launches(self, t: NDArray[np.int64]) -> Iterator[tuple[int, int, int]]:
         """Cut a chunk where the relative times would leave their bits, moving the base in between.

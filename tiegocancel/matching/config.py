@@ -6,12 +6,14 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
 __all__ = ["MAX_GATE_US", "MAX_TOLERANCE_PX", "CancelConfig", "Polarity"]
 
 Polarity = Literal["opposite", "equal", "ignore"]
 
-MAX_GATE_US = 1 << 28
-"""Bound of horizon and temporal gate (268 s): their sum must fit the 30-bit relative times of a packed cell."""
+MAX_GATE_US = (1 << 28) - 1
+"""Bound of horizon and temporal gate (268 s): twice their sum must fit the 30-bit relative times of a packed cell."""
 
 MAX_TOLERANCE_PX = 64.0
 MAX_RING_CAPACITY = 1 << 28
@@ -39,11 +41,18 @@ class CancelConfig:
             ("ring_capacity", 1, MAX_RING_CAPACITY),
         ):
             value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+            whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+            if not whole or not low <= value <= high:
                 raise ValueError(f"{name} must be an integer from {low} to {high}, not {value!r}")
+            object.__setattr__(self, name, int(value))
         reach = self.tolerance_px
-        if isinstance(reach, bool) or not isinstance(reach, int | float) or not 0 <= reach <= MAX_TOLERANCE_PX:
+        if (
+            isinstance(reach, bool)
+            or not isinstance(reach, int | float | np.number)
+            or not 0 <= reach <= MAX_TOLERANCE_PX
+        ):
             raise ValueError(f"tolerance_px must be a number from 0 to {MAX_TOLERANCE_PX:g}, not {reach!r}")
+        object.__setattr__(self, "tolerance_px", float(reach))
         if self.polarity not in ("opposite", "equal", "ignore"):
             raise ValueError(f"polarity must be 'opposite', 'equal' or 'ignore', not {self.polarity!r}")
 

@@ -29,6 +29,7 @@ class DisplacementHistogram:
         self.by_offset: NDArray[np.int64] = np.zeros((self.side, self.side), np.int64)
         gate = max(config.tolerance_us, 1)
         self.lateness_edges_us: NDArray[np.float64] = np.linspace(-gate - 0.5, gate + 0.5, TIME_BINS + 1)
+        self._late_sum_us = 0
         self.by_lateness: NDArray[np.int64] = np.zeros(TIME_BINS, np.int64)
 
     def add(self, matches: Matches) -> None:
@@ -36,10 +37,11 @@ class DisplacementHistogram:
         counted = matches.t_us >= self.counted_from_us
         cell = (matches.dy[counted] + self.reach_px) * self.side + matches.dx[counted] + self.reach_px
         self.by_offset += np.bincount(cell, minlength=self.by_offset.size).reshape(self.by_offset.shape)
+        self._late_sum_us += int(matches.late_us[counted].sum())
         self.by_lateness += np.histogram(matches.late_us[counted], self.lateness_edges_us)[0]
 
     def summary(self) -> dict[str, Any]:
-        """Return count, mean vector, mean and 95th percentile of the distance (px), mean lateness (µs, binned)."""
+        """Return count, mean vector, mean and 95th percentile of the distance (px), mean lateness (µs)."""
         total = int(self.by_offset.sum())
         if not total:
             return {"matches": 0}
@@ -48,12 +50,11 @@ class DisplacementHistogram:
         distance = np.hypot(dx, dy)
         order = np.argsort(distance, axis=None, kind="stable")
         cumulative = np.cumsum(self.by_offset.ravel()[order])
-        centers = (self.lateness_edges_us[1:] + self.lateness_edges_us[:-1]) / 2
         return {
             "matches": total,
             "mean_dx_px": float((dx * self.by_offset).sum() / total),
             "mean_dy_px": float((dy * self.by_offset).sum() / total),
             "mean_px": float((distance * self.by_offset).sum() / total),
             "p95_px": float(distance.ravel()[order][int(np.searchsorted(cumulative, 0.95 * total))]),
-            "mean_late_us": float((centers * self.by_lateness).sum() / total),
+            "mean_late_us": self._late_sum_us / total,
         }

@@ -30,13 +30,15 @@ class DiscRegion:
         self.center_px, self.radius_px, self.ring_px = center_px, radius_px, ring_px
         right = np.arange(width, dtype=np.float64) - center_px[0]
         down = np.arange(height, dtype=np.float64) - center_px[1]
-        radius = np.sqrt(right[None, :] ** 2 + down[:, None] ** 2).ravel()
-        nearest = math.floor(radius.min() / ring_px)
-        ring = np.floor(radius / ring_px).astype(np.int64) - nearest
-        self.rings = int(ring.max()) + 1
-        self.ring_edges_px: NDArray[np.float64] = (nearest + np.arange(self.rings + 1)) * ring_px
+        nearest = math.floor(math.hypot(np.abs(right).min(), np.abs(down).min()) / ring_px)
         # One code a pixel: 2 · ring + (1 on the disc), so that a single look-up serves profile and regions.
-        self._codes = (2 * ring + (radius <= radius_px)).astype(np.int32)
+        self._codes = np.empty(width * height, np.int32)
+        for row in range(height):  # row by row, for the sake of memory
+            radius = np.hypot(right, down[row])
+            ring = (radius / ring_px).astype(np.int32) - nearest
+            self._codes[row * width : (row + 1) * width] = 2 * ring + (radius <= radius_px)
+        self.rings = int(self._codes.max() >> 1) + 1
+        self.ring_edges_px: NDArray[np.float64] = (nearest + np.arange(self.rings + 1)) * ring_px
         self.areas_px = np.bincount(self._codes, minlength=2 * self.rings).reshape(self.rings, 2)
 
     def codes(self, events: Events) -> NDArray[np.int32]:

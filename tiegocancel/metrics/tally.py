@@ -72,12 +72,17 @@ class Tally:
         """Tell whether any event carried a label."""
         return self._labelled
 
-    def selectivity(self) -> dict[str, float] | None:
-        """Return the shares of ego, mover and noise events suppressed, and J = ego − mover; ``None`` unlabelled."""
+    def selectivity(self) -> dict[str, float | None] | None:
+        """Return the shares of ego, mover and noise events suppressed, and J = ego − mover; ``None`` unlabelled.
+
+        The share of a cause without events is ``None``, and so is J without ego or without mover.
+        """
         if not self._labelled:
             return None
-        ego, mover, noise = (self.share(label=label).ratio for label in (EGO, MOVER, NOISE))
-        return {"ego": ego, "mover": mover, "noise": noise, "j": ego - mover}
+        counts = [self.share(label=label) for label in (EGO, MOVER, NOISE)]
+        ego, mover, noise = (count.ratio if count.events else None for count in counts)
+        j = None if ego is None or mover is None else ego - mover
+        return {"ego": ego, "mover": mover, "noise": noise, "j": j}
 
     def radial(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
         """Return area in px, events and residual events of each ring, int64[rings] each."""

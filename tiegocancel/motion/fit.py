@@ -109,7 +109,7 @@ def fit_rotation(events: Events, *, seed: int = 0, config: FitConfig | None = No
     span_ms = (fits[0].stop_us - fits[0].start_us) * 1e-3
     notes = [
         f"{len(windows)} window(s) of {span_ms:.1f} ms, {used} of their {total} events used "
-        f"({len(events)} in the recording), contrast gain {gain:.2f}",
+        f"({len(events)} were given), contrast gain {gain:.2f}",
         *(f"low confidence: {doubt}" for doubt in doubts),
     ]
     return RotationFit(

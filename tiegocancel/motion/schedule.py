@@ -38,8 +38,9 @@ class MotionSchedule:
         if (times[1:] < times[:-1]).any():
             row = int(np.argmax(times[1:] < times[:-1])) + 1
             raise ValueError(f"t_us must not decrease: row {row} has {times[row]} µs after {times[row - 1]} µs")
-        if (np.abs(table) > MAX_COEFFICIENT).any():
-            row = int(np.argmax((np.abs(table) > MAX_COEFFICIENT).any(axis=1)))
+        beyond = ((table > MAX_COEFFICIENT) | (table < -MAX_COEFFICIENT)).any(axis=1)
+        if beyond.any():
+            row = int(np.argmax(beyond))
             raise ValueError(f"coefficients must lie within ±2^44: row {row} has {table[row].tolist()}")
         for name, column in (("t_us", times), ("coefficients", table)):
             column.flags.writeable = False
@@ -90,6 +91,8 @@ def rotation_coefficients(
         np.asarray(center_y_px, np.float64),
         np.asarray(omega_rad_s, np.float64),
     )
+    if horizon_us < 0:
+        raise ValueError(f"horizon_us must not be negative, not {horizon_us}")
     if not (np.isfinite(cx).all() and np.isfinite(cy).all() and np.isfinite(omega).all()):
         raise ValueError("centre and angular velocity must be finite")
     theta = omega * (horizon_us * 1e-6)
@@ -112,4 +115,6 @@ def _integers(name: str, values: ArrayLike) -> NDArray[np.int64]:
             raise ValueError(f"{name} must be whole numbers; floats are rounded by rotation_coefficients, not here")
     elif given.dtype.kind not in "biu":
         raise ValueError(f"{name} must be integers, not {given.dtype}")
+    elif given.dtype.kind == "u" and given.size and int(given.max()) > np.iinfo(np.int64).max:
+        raise ValueError(f"{name} must fit 64 bits with a sign, not {given.max()}")
     return np.array(given, np.int64)

@@ -53,7 +53,7 @@ _FIGURES: tuple[tuple[str, str, Callable[[RunResult], Figure | None], str], ...]
         "time_slices",
         "A slice through time",
         time_slices,
-        "The events of three rows half-way down to the rim, against time. There a rotation moves every edge sideways "
+        "The events of a few rows below the centre, against time. Along a row a rotation moves every edge sideways "
         "at one speed: slanted streaks. Left all events, right what remains: streaks that follow the motion thin out, "
         "others stay.",
     ),
@@ -76,7 +76,7 @@ _FIGURES: tuple[tuple[str, str, Callable[[RunResult], Figure | None], str], ...]
         "rate",
         "Over time",
         rate,
-        "Event rate before and after. The grey stretch is warm-up: nothing predicted has fallen due yet.",
+        "Event rate before and after. The grey stretch is the warm-up of horizon and gate, left out of every ratio.",
     ),
 )
 

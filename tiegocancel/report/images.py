@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from numpy.typing import NDArray
@@ -20,12 +21,7 @@ _PIXELS_ACROSS = 1500  # image pixels that a figure shows side by side
 
 def signed_counts(events: Events) -> NDArray[np.int64]:
     """Return ON minus OFF events a pixel, int64[height, width]."""
-    pixel = events.y.astype(np.intp) * events.width + events.x
-    size = events.width * events.height
-    on = np.bincount(pixel[events.p == 1], minlength=size)
-    off = np.bincount(pixel[events.p == 0], minlength=size)
-    signed: NDArray[np.int64] = (on - off).reshape(events.height, events.width)
-    return signed
+    return _counts(events.select(events.p == 1)) - _counts(events.select(events.p == 0))
 
 
 def scene(photograph: NDArray[np.float32], result: RunResult) -> Figure:
@@ -67,11 +63,12 @@ def before_after(result: RunResult) -> Figure | None:
         panel.imshow(image, cmap=style.SIGNED, vmin=-limit, vmax=limit, extent=extent, interpolation="nearest")
         _frame(panel, result, f"{name}: {len(part):,} in {span_ms:.1f} ms")
     if residual.label is not None:
+        colours, reach = _cause_image(residual, block)
+        axes[2].imshow(colours, extent=reach, interpolation="nearest")
         for cause, name, colour in _CAUSES:
-            part = residual.select(residual.label == cause)
-            axes[2].plot(part.x, part.y, ",", color=colour, alpha=0.9)
-            axes[2].plot([], [], "s", color=colour, label=f"{name} {len(part):,}")
-        axes[2].legend(loc="lower right", fontsize=7, handletextpad=0.2, borderpad=0.2)
+            count = int(np.count_nonzero(residual.label == cause))
+            axes[2].plot([], [], "s", color=colour, label=f"{name} {count:,}")
+        axes[2].legend(loc="upper center", bbox_to_anchor=(0.5, 0.0), ncols=3, fontsize=7, handletextpad=0.1)
         _frame(axes[2], result, "residual by cause")
     for panel in axes:
         panel.set(xlim=(left, right), ylim=(bottom, top), aspect="equal")
@@ -85,7 +82,8 @@ def _view(events: Events, result: RunResult) -> tuple[float, float, float, float
         (events.x, events.y), (events.width, events.height), result.region.center_px, strict=True
     ):
         low, high = (float(value) for value in np.percentile(column, (0.5, 99.5)))
-        low, high = min(low, center - result.region.radius_px), max(high, center + result.region.radius_px)
+        if result.disc_seen:
+            low, high = min(low, center - result.region.radius_px), max(high, center + result.region.radius_px)
         margin = 0.02 * (high - low) + 4
         edges += [max(low - margin, -0.5), min(high + margin, side - 0.5)]
     left, right, top, bottom = edges
@@ -95,6 +93,21 @@ def _view(events: Events, result: RunResult) -> tuple[float, float, float, float
     if right - left < bottom - top:
         left, right = max(left - (bottom - top) / 4, -0.5), min(right + (bottom - top) / 4, events.width - 0.5)
     return left, right, top, bottom
+
+
+def _cause_image(events: Events, block: int) -> tuple[NDArray[np.float64], tuple[float, float, float, float]]:
+    """Colour each block of pixels by the cause of most of its events, white where there are none."""
+    assert events.label is not None
+    counts = np.stack([_blocks(_counts(events.select(events.label == cause)), block) for cause, _, _ in _CAUSES])
+    palette = np.array([to_rgb(colour) for _, _, colour in _CAUSES])
+    image = np.where((counts.sum(axis=0) > 0)[..., None], palette[counts.argmax(axis=0)], 1.0)
+    return image, (-0.5, image.shape[1] * block - 0.5, image.shape[0] * block - 0.5, -0.5)
+
+
+def _counts(events: Events) -> NDArray[np.int64]:
+    """Return events a pixel, int64[height, width]."""
+    pixel = events.y.astype(np.intp) * events.width + events.x
+    return np.bincount(pixel, minlength=events.width * events.height).reshape(events.height, events.width)
 
 
 def _blocks(image: NDArray[np.int64], block: int) -> NDArray[np.int64]:
@@ -130,10 +143,12 @@ def time_slices(result: RunResult) -> Figure | None:
 
 
 def _frame(axes: Axes, result: RunResult, title: str) -> None:
-    """Take the ticks off an image and mark the disc."""
+    """Take the ticks off an image and mark the disc, where there is one."""
     axes.set_title(title)
     axes.set_xticks([])
     axes.set_yticks([])
+    if not result.disc_seen:
+        return
     axes.add_patch(
         Circle(result.region.center_px, result.region.radius_px, fill=False, color=style.MUTED, linewidth=0.7, ls="--")
     )

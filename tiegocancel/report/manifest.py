@@ -13,28 +13,42 @@ from typing import Any
 
 import tiegocancel
 
-__all__ = ["plain", "write_manifest"]
+__all__ = ["input_record", "plain", "write_manifest"]
 
 _BLOCK_BYTES = 1 << 20
 
 
 def write_manifest(
-    path: Path, *, command: list[str], settings: Any, inputs: list[Path], outputs: list[Path], results: dict[str, Any]
-) -> dict[str, Any]:
-    """Write ``manifest.json`` and return it: enough to run the same thing again and to see that it was the same."""
+    path: Path,
+    *,
+    command: list[str],
+    settings: Any,
+    inputs: list[dict[str, Any]],
+    outputs: list[str],
+    results: dict[str, Any],
+) -> None:
+    """Write the manifest: enough to run the same thing again and to see that it was the same.
+
+    ``inputs`` come from :func:`input_record`, ``outputs`` are names beside the manifest.
+    """
     manifest = {
         "tiegocancel": tiegocancel.__version__,
         "commit": _commit(),
         "command": command,
         "settings": plain(settings),
-        "inputs": [{"path": str(file), "bytes": file.stat().st_size, "sha256": _sha256(file)} for file in inputs],
-        "outputs": [file.name for file in outputs],
+        "inputs": inputs,
+        "outputs": outputs,
         "versions": {"python": platform.python_version(), **_versions("taichi", "numpy", "scipy", "matplotlib")},
         "machine": platform.machine(),
         "results": results,
     }
-    path.write_text(json.dumps(manifest, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
-    return manifest
+    text = json.dumps(manifest, indent=2, ensure_ascii=False) + "\n"
+    path.write_text(text, encoding="utf-8", errors="backslashreplace")
+
+
+def input_record(path: Path) -> dict[str, Any]:
+    """Return path, size in bytes and SHA-256 of an input."""
+    return {"path": str(path), "bytes": path.stat().st_size, "sha256": _sha256(path)}
 
 
 def plain(value: Any) -> Any:

@@ -11,17 +11,12 @@ from string import Template
 from typing import Any
 
 from tiegocancel.report.figures import Drawing
+from tiegocancel.study.controls import CONTROLS
 from tiegocancel.study.result import RunResult
 from tiegocancel.study.verdict import Verdict
 from tiegocancel.units import rate_text
 
 __all__ = ["write_page"]
-
-_CONTROL_ROWS = (
-    ("zero_motion", "zero motion", "predict “same place”: what a wide gate and slow motion give for nothing"),
-    ("reversed_motion", "reversed motion", "turn the other way: wrong everywhere but at the centre"),
-    ("time_shuffled", "times shuffled", "true motion on pixels permuted against their times: chance at this density"),
-)
 
 
 def write_page(
@@ -31,21 +26,26 @@ def write_page(
     numbers = result.to_json()
     tiles = _tiles(result, numbers)
     template = Template(files("tiegocancel.report").joinpath("page.html").read_text(encoding="utf-8"))
+    # A file name may hold bytes that are no text; they are shown escaped.
     path.write_text(
         template.substitute(
             title=escape(title),
             subtitle=escape(_subtitle(result)),
             grade=verdict.grade,
             headline=escape(verdict.headline),
+            fault=""
+            if result.fault is None
+            else f"<section class='fault'>Incomplete: {escape(result.fault)}</section>",
             reasons="".join(f"<p>{escape(reason)}</p>" for reason in verdict.reasons),
             tiles="".join(_tile(*tile) for tile in tiles),
-            columns=3 if len(tiles) % 4 and len(tiles) % 3 == 0 else 4,
+            columns={5: 5, 6: 3}.get(len(tiles), 4),
             controls=_control_table(result, numbers),
             figures="".join(_figure(drawing) for drawing in drawings),
             details="".join(_details(heading, rows) for heading, rows in _detail_tables(result, numbers)),
             remarks=_remarks(result, notes),
         ),
         encoding="utf-8",
+        errors="backslashreplace",
     )
 
 
@@ -59,24 +59,35 @@ def _subtitle(result: RunResult) -> str:
 
 def _tiles(result: RunResult, numbers: dict[str, Any]) -> list[tuple[str, str, str]]:
     """Return value, name and remark of the numbers that lead the page."""
-    disc = numbers["regions"]["disc"]
+    share = result.tally.share(on_disc=result.lead_region)
     tiles = [
-        (f"{numbers['cancellation_ratio']:.1%}", "cancellation ratio", "events that need not be sent"),
-        (f"{disc['cancellation_ratio']:.1%}", "on the disc", f"radius {result.region.radius_px:g} px"),
+        (_share(numbers["cancellation_ratio"], result.tally.share().events), "cancellation ratio", "need not be sent")
     ]
-    if "zero_motion" in disc["controls"]:
-        gap = disc["cancellation_ratio"] - disc["controls"]["zero_motion"]
-        tiles.append((f"{100 * gap:+.1f} points", "beyond zero motion", "on the disc"))
+    if result.lead_region:
+        tiles.append((_share(share.ratio, share.events), "on the disc", f"radius {result.region.radius_px:g} px"))
+    if result.controls and share.events:
+        best = max(tally.share(on_disc=result.lead_region).ratio for tally in result.controls.values())
+        tiles.append((f"{100 * (share.ratio - best):+.1f} points", "beyond the best control", _where(result)))
     selectivity = numbers["selectivity"]
-    if selectivity is not None:
+    if selectivity is not None and selectivity["j"] is not None:
         tiles.append((f"{selectivity['mover']:.1%}", "of the mover lost", "suppressed wrongly"))
-        tiles.append((f"{selectivity['j']:.2f}", "selectivity J", "ego − mover share"))
-    if result.duration_s:
-        before, after = (numbers[name] / result.duration_s for name in ("events", "residual"))
-        tiles.append((rate_text(after), "still sent", f"of {rate_text(before)}"))
+        tiles.append((f"{selectivity['j']:.3f}", "selectivity J", "ego − mover share"))
+    if result.duration_s and result.tally.share().events:
+        rate_hz = numbers["events"] / result.duration_s
+        sent = rate_text(rate_hz * (1 - numbers["cancellation_ratio"]))
+        tiles.append((sent, "still sent", f"of {rate_text(rate_hz)}, after the warm-up"))
     tiles.append((f"{numbers['state']['kib']:,.0f} KiB", "of state", "ring and table, constant"))
     tiles.append((rate_text(numbers["events_per_second"]), "decided", "on this machine, one thread"))
     return tiles
+
+
+def _where(result: RunResult) -> str:
+    return "on the disc" if result.lead_region else "everywhere"
+
+
+def _share(value: float | None, events: int = 1) -> str:
+    """Write a share, or a dash where nothing was measured."""
+    return f"{value:.1%}" if value is not None and events else "–"
 
 
 def _tile(value: str, name: str, remark: str) -> str:
@@ -89,25 +100,24 @@ def _tile(value: str, name: str, remark: str) -> str:
 def _control_table(result: RunResult, numbers: dict[str, Any]) -> str:
     """Show the ratios of the run and of its controls side by side."""
     labelled = numbers["selectivity"] is not None
-    heads = (
-        ["", "all events", "disc", "background"] + (["ego", "mover", "noise", "J"] if labelled else []) + ["meaning"]
-    )
+    heads = ["", "all events"] + (["disc", "background"] if numbers["disc_seen"] else [])
+    heads += (["ego", "mover", "noise", "J"] if labelled else []) + ["meaning"]
     rows = [_ratio_row("motion given", "what the canceller was told", numbers["cancellation_ratio"], None, numbers)]
-    for key, name, meaning in _CONTROL_ROWS:
-        if key in numbers["controls"]:
-            rows.append(_ratio_row(name, meaning, numbers["controls"][key], key, numbers))
+    for name, ratio in numbers["controls"].items():
+        rows.append(_ratio_row(CONTROLS[name].label, CONTROLS[name].meaning, ratio, name, numbers))
     head = "".join(f"<th>{escape(text)}</th>" for text in heads)
     return f"<table class='ratios'><thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
 
 
 def _ratio_row(name: str, meaning: str, whole: float, control: str | None, numbers: dict[str, Any]) -> str:
-    regions = [numbers["regions"][region] for region in ("disc", "background")]
+    regions = [numbers["regions"][region] for region in ("disc", "background") if numbers["disc_seen"]]
     shares = [whole] + [region["controls"][control] if control else region["cancellation_ratio"] for region in regions]
     counts = [numbers["warm_up"]["events_counted"], *(region["events"] for region in regions)]
-    cells = [f"{share:.1%}" if count else "–" for share, count in zip(shares, counts, strict=True)]
+    cells = [_share(share, count) for share, count in zip(shares, counts, strict=True)]
     if numbers["selectivity"] is not None:
         selectivity = numbers["selectivity_of_controls"][control] if control else numbers["selectivity"]
-        cells += [f"{selectivity[cause]:.1%}" for cause in ("ego", "mover", "noise")] + [f"{selectivity['j']:.2f}"]
+        cells += [_share(selectivity[cause]) for cause in ("ego", "mover", "noise")]
+        cells.append("–" if selectivity["j"] is None else f"{selectivity['j']:.2f}")
     body = "".join(f"<td class='number'>{cell}</td>" for cell in cells)
     lead = " class='lead'" if control is None else ""
     return f"<tr{lead}><th>{escape(name)}</th>{body}<td class='meaning'>{escape(meaning)}</td></tr>"
@@ -174,9 +184,8 @@ def _figure(drawing: Drawing) -> str:
 
 
 def _remarks(result: RunResult, notes: Sequence[str]) -> str:
-    """List what went wrong or was assumed; a fault in the input comes first."""
-    lines = ([f"The input ended early: {result.fault}"] if result.fault else []) + list(result.notes)
-    lines += [*notes, *result.trajectory.notes]
+    """List what was assumed and what fell short."""
+    lines = [*result.notes, *notes, *result.trajectory.notes]
     if not lines:
         return ""
     return (

@@ -7,34 +7,33 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
 from tiegocancel.report import style
+from tiegocancel.study.controls import CONTROLS
 from tiegocancel.study.result import RunResult
 
 __all__ = ["controls", "displacement", "radial_profile", "rate"]
-
-_NAMES = {"zero_motion": "zero motion", "reversed_motion": "reversed", "time_shuffled": "times shuffled"}
 
 
 def controls(result: RunResult) -> Figure | None:
     """Draw the share suppressed under the motion and under each control; ego beside mover where labelled."""
     if not result.controls:
         return None
-    tallies = {"motion given": result.tally} | {_NAMES[name]: tally for name, tally in result.controls.items()}
+    tallies = {"motion given": result.tally} | {CONTROLS[name].label: tally for name, tally in result.controls.items()}
     names = list(tallies)
     labelled = result.tally.labelled
     drawn = style.figure(10.5, 2.9)
     panels = drawn.subplots(1, 2 if labelled else 1, squeeze=False)[0]
     bars = panels[0].bar(
         names,
-        [tally.share(on_disc=True).ratio for tally in tallies.values()],
+        [tally.share(on_disc=result.lead_region).ratio for tally in tallies.values()],
         width=0.6,
         color=[style.RESIDUAL] + [style.BEFORE] * (len(names) - 1),
     )
     panels[0].bar_label(bars, fmt=lambda value: f"{value:.1%}", padding=2, fontsize=8)
-    panels[0].set_title("suppressed on the disc")
+    panels[0].set_title("suppressed on the disc" if result.lead_region else "suppressed everywhere")
     if labelled:
         place = np.arange(len(names))
         for shift, label, colour in ((-0.2, "ego", style.EGO), (0.2, "mover", style.MOVER)):
-            shares = [(tally.selectivity() or {})[label] for tally in tallies.values()]
+            shares = [(tally.selectivity() or {})[label] or 0.0 for tally in tallies.values()]
             bars = panels[1].bar(place + shift, shares, width=0.38, color=colour, label=label)
             panels[1].bar_label(bars, fmt=lambda value: f"{value:.0%}", padding=2, fontsize=7)
         panels[1].set_xticks(place, names)
@@ -64,8 +63,9 @@ def radial_profile(result: RunResult) -> Figure | None:
     left.set(title="density", xlabel="distance from the centre (px)", ylabel="events a pixel", ylim=(0, None))
     left.legend()
     enough = events[seen] >= 50
-    share = 1 - residual[seen][enough] / events[seen][enough]
-    right.plot(middle[enough], share, color=style.RESIDUAL, linewidth=1.6)
+    share = np.full(len(middle), np.nan)  # gaps where rings are too empty to tell
+    share[enough] = 1 - residual[seen][enough] / events[seen][enough]
+    right.plot(middle, share, color=style.RESIDUAL, linewidth=1.6)
     right.set(
         title="share suppressed (rings of 50 events or more)", xlabel="distance from the centre (px)", ylim=(0, 1.02)
     )
@@ -113,16 +113,16 @@ def displacement(result: RunResult) -> Figure | None:
 def rate(result: RunResult) -> Figure | None:
     """Draw the event rate before and after, over the whole stream."""
     seconds, before, after = result.rate.series()
-    drawn = style.figure(10.5, 2.6)
+    drawn = style.figure(10.5, 2.8)
     axes = drawn.subplots()
-    milliseconds = seconds * 1000
+    edges_ms = np.append(seconds, seconds[-1] + result.rate.bin_us * 1e-6) * 1000
+    factor, unit = (1e6, "Mev/s") if before.max() >= 1e6 else (1e3, "kev/s")
     for rates, colour, name in ((before, style.BEFORE, "all events"), (after, style.RESIDUAL, "residual")):
-        axes.step(milliseconds, rates / 1e6, where="post", color=colour, label=name, linewidth=1.2)
-        axes.fill_between(milliseconds, rates / 1e6, step="post", color=colour, alpha=0.2, linewidth=0)
-    axes.axvspan(0, result.settings.cancel.warm_up_us / 1000, color=style.GRID, alpha=0.7, linewidth=0)
-    axes.set(
-        xlabel="time since the first event (ms)", ylabel="Mev/s", ylim=(0, None), xlim=(0, max(milliseconds[-1], 1))
-    )
-    axes.legend(loc="upper right", ncols=2)
+        axes.stairs(rates / factor, edges_ms, color=colour, label=name, linewidth=1.2)
+        axes.stairs(rates / factor, edges_ms, color=colour, alpha=0.2, fill=True)
+    warm_up_ms = result.settings.cancel.warm_up_us / 1000
+    axes.axvspan(0, min(warm_up_ms, edges_ms[-1]), color=style.GRID, alpha=0.7, linewidth=0)
+    axes.set(xlabel="time since the first event (ms)", ylabel=unit, ylim=(0, None), xlim=(0, edges_ms[-1]))
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.1)
     style.tidy(axes)
     return drawn

@@ -24,12 +24,14 @@ class RunResult:
     """One pass over a stream: the canceller's tally, its controls beside it, and what the figures need.
 
     ``fault`` is the line of the error that ended the stream early, if one did; the rest describes what came before.
-    ``seconds`` is the time inside ``Canceller.process``.
+    ``seconds`` is the time inside ``Canceller.process``; ``disc_seen``: a disc was declared or found, otherwise
+    ``region`` is the circle that holds 99 % of the events.
     """
 
     settings: Settings
     trajectory: RotationTrajectory
     region: DiscRegion
+    disc_seen: bool
     width: int
     height: int
     first_us: int
@@ -49,6 +51,11 @@ class RunResult:
     def duration_s(self) -> float:
         """Time from the first to the last event in s."""
         return (self.last_us - self.first_us) * 1e-6
+
+    @property
+    def lead_region(self) -> bool | None:
+        """Which region the headline is about: the disc (``True``), or everything (``None``) where none is seen."""
+        return True if self.disc_seen and self.tally.share(on_disc=True).events else None
 
     @property
     def state(self) -> StateBits:
@@ -87,7 +94,9 @@ class RunResult:
                 }
                 for name, on_disc in (("disc", True), ("background", False))
             },
+            "disc_center_px": [float(value) for value in self.region.center_px],
             "disc_radius_px": self.region.radius_px,
+            "disc_seen": self.disc_seen,
             "radial_profile": {
                 "ring_edges_px": self.region.ring_edges_px.tolist(),
                 **dict(zip(("area_px", "events", "residual"), (c.tolist() for c in self.tally.radial()), strict=True)),

@@ -6,11 +6,10 @@ import time
 from collections.abc import Callable, Iterable
 from typing import Protocol
 
-import numpy as np
-
 from tiegocancel.chunks import rechunk
-from tiegocancel.errors import TiegoCancelError
+from tiegocancel.errors import ConfigError, TiegoCancelError
 from tiegocancel.events import Events
+from tiegocancel.interrupt import deferred_interrupt
 from tiegocancel.matching.canceller import Canceller
 from tiegocancel.metrics import (
     DiscRegion,
@@ -22,14 +21,16 @@ from tiegocancel.metrics import (
 )
 from tiegocancel.motion.schedule import MotionSchedule
 from tiegocancel.motion.trajectory import RotationTrajectory
+from tiegocancel.study.controls import CONTROLS, Control, ShuffledControl
 from tiegocancel.study.result import INTERRUPTED, RunResult
 from tiegocancel.study.settings import Settings
 from tiegocancel.study.stretch import Densest
 from tiegocancel.units import rate_text
 
-__all__ = ["CONTROLS", "run_stream"]
+__all__ = ["run_stream"]
 
-CONTROLS = ("zero_motion", "reversed_motion", "time_shuffled")
+MAX_ENTRIES = 1 << 20
+MAX_PIXELS = 1 << 28
 
 
 class _Sink(Protocol):
@@ -38,30 +39,11 @@ class _Sink(Protocol):
     def write(self, events: Events) -> None: ...
 
 
-class _Control:
-    """Run one control on the events that the main run sees."""
-
-    def __init__(self, canceller: Canceller, tally: Tally, rng: np.random.Generator | None) -> None:
-        self.canceller, self.tally, self._rng = canceller, tally, rng
-
-    def process(self, events: Events) -> None:
-        """Decide and count a chunk, its pixels permuted against its times when this control shuffles."""
-        if self._rng is not None:
-            order = self._rng.permutation(len(events))
-            label = None if events.label is None else events.label[order]
-            events = Events(
-                events.t, events.x[order], events.y[order], events.p[order], events.width, events.height, label
-            )
-        self.tally.add(events, self.canceller.process(events).suppressed)
-
-
 def run_stream(
     chunks: Iterable[Events],
     settings: Settings,
     trajectory: RotationTrajectory,
     *,
-    width: int,
-    height: int,
     sink: _Sink | None = None,
     disc_radius_px: float | None = None,
     expected_us: int | None = None,
@@ -70,13 +52,24 @@ def run_stream(
     """Cancel a stream, write what remains to ``sink``, measure it; return ``None`` for a stream without events.
 
     ``disc_radius_px`` is used where the settings leave it open; pictures are taken half-way through ``expected_us`` of
-    stream, or after the warm-up where that is unknown. When ``chunks`` raises a :class:`TiegoCancelError`,
-    what came before counts and the error's line stands in ``RunResult.fault``; so it is when the user interrupts.
+    stream, or after the warm-up where that is unknown. When ``chunks`` raises a :class:`TiegoCancelError`, what came
+    before counts and the error's line stands in ``RunResult.fault``; so it is when the user interrupts, who is heard
+    between chunks.
     """
     run: _Run | None = None
     fault: str | None = None
-    try:
-        for chunk in rechunk(chunks, settings.report.chunk_events):
+    source = iter(rechunk(chunks, settings.report.chunk_events))
+    with deferred_interrupt() as interrupt:
+        while fault is None:
+            try:
+                chunk = next(source)
+            except StopIteration:
+                break
+            except (TiegoCancelError, KeyboardInterrupt) as error:
+                if run is None:
+                    raise
+                fault = INTERRUPTED if isinstance(error, KeyboardInterrupt) else str(error)
+                break
             if run is None:
                 run = _Run(settings, trajectory, chunk, disc_radius_px, expected_us)
             residual = run.process(chunk)
@@ -84,11 +77,7 @@ def run_stream(
                 sink.write(residual)
             if progress is not None:
                 progress(chunk)
-    except (TiegoCancelError, KeyboardInterrupt) as error:
-        if run is None:
-            raise
-        interrupted = isinstance(error, KeyboardInterrupt)
-        fault = INTERRUPTED if interrupted else str(error)
+            fault = INTERRUPTED if interrupt.wanted else None
     return None if run is None else run.finish(fault)
 
 
@@ -106,13 +95,14 @@ class _Run:
         config = settings.cancel
         self.settings, self.trajectory = settings, trajectory
         self.width, self.height = first.width, first.height
+        if self.width * self.height > MAX_PIXELS:
+            raise ConfigError(f"a sensor of {self.width}×{self.height} px is beyond the 2^28 px that a run holds")
         self.first_us, self.last_us = int(first.t[0]), int(first.t[-1])
         self.notes: list[str] = []
         counted_from_us = self.first_us + config.warm_up_us
         center, _ = trajectory.mean(start_us=self.first_us, stop_us=self.last_us)
-        self.region = DiscRegion(
-            self.width, self.height, center_px=center, radius_px=self._radius(first, center, disc_radius_px)
-        )
+        radius_px, self.disc_seen = self._radius(first, center, disc_radius_px)
+        self.region = DiscRegion(self.width, self.height, center_px=center, radius_px=radius_px)
         self.motion = self._motion(trajectory)
         self.canceller = Canceller(config, self.motion, width=self.width, height=self.height)
         self.ledger = Ledger(config, self.motion)
@@ -157,6 +147,9 @@ class _Run:
                 f"at the peak of {rate_text(self.rate.peak_hz())} it needs about "
                 f"{int(self.rate.peak_hz() * window_s):,} (--ring-capacity)"
             )
+        for control in self.controls.values():
+            control.finish()
+        self.notes += self._doubts()
         if not self.tally.share().events:
             self.notes.append(
                 f"no event lies beyond the warm-up of {self.settings.cancel.warm_up_us / 1000:g} ms: every ratio is 0; "
@@ -166,6 +159,7 @@ class _Run:
             settings=self.settings,
             trajectory=self.trajectory,
             region=self.region,
+            disc_seen=self.disc_seen,
             width=self.width,
             height=self.height,
             first_us=self.first_us,
@@ -182,15 +176,43 @@ class _Run:
             notes=tuple(self.notes),
         )
 
-    def _radius(self, first: Events, center: tuple[float, float], given: float | None) -> float:
-        """Take the declared radius, the scene's, or a guess from the first chunk."""
+    def _doubts(self) -> list[str]:
+        """Say where the motion was not known, and where the shuffle was too short to tell chance."""
+        doubts = []
+        known = self.trajectory.t_us
+        before = min(max(int(known[0]) - self.first_us, 0), self.last_us - self.first_us)
+        after = min(max(self.last_us - int(known[-1]), 0), self.last_us - self.first_us)
+        if len(known) > 1 and before + after > 0:
+            share = (before + after) / max(self.last_us - self.first_us, 1)
+            seconds = [int(t) / 1e6 for t in (known[0], known[-1], self.first_us, self.last_us)]
+            doubts.append(
+                f"the motion of {self.trajectory.source} is known from {seconds[0]:.6f} to {seconds[1]:.6f} s, "
+                f"the events lie from {seconds[2]:.6f} to {seconds[3]:.6f} s: for {share:.0%} of that time the "
+                "nearest known value was held"
+            )
+        shuffled = self.controls.get("time_shuffled")
+        shortest_us = shuffled.shortest_us if isinstance(shuffled, ShuffledControl) else None
+        if shortest_us is not None and shortest_us < 2 * self.settings.cancel.warm_up_us:
+            doubts.append(
+                f"times were shuffled within {shortest_us / 1000:.1f} ms, not much longer than the horizon: "
+                "the control keeps some structure and stands too high"
+            )
+        return doubts
+
+    def _radius(self, first: Events, center: tuple[float, float], given: float | None) -> tuple[float, bool]:
+        """Take the declared radius, the scene's, or a guess from the first chunk; say whether it is a disc at all."""
         declared = self.settings.report.disc_radius_px
         radius = given if declared is None else declared
-        if radius is None:
-            radius, edge_seen = estimate_radius_px(first, center)
-            told = "guessed from the radial density" if edge_seen else "of the circle that holds 99 % of the events"
-            self.notes.append(f"disc radius {radius:g} px {told} (--disc-radius-px declares it)")
-        return radius
+        if radius is not None:
+            return radius, True
+        guess, edge_seen = estimate_radius_px(first, center)
+        if edge_seen:
+            self.notes.append(
+                f"disc radius {guess:g} px guessed from the radial density (--disc-radius-px declares it)"
+            )
+        else:
+            self.notes.append("no disc is seen in the density of events: ratios are of the whole sensor")
+        return guess, edge_seen
 
     def _slice_rows(self) -> tuple[int, int]:
         """Choose rows half-way down to the rim, where a rotation moves edges sideways at one speed."""
@@ -202,21 +224,28 @@ class _Run:
         """Give the canceller the path that the settings ask for."""
         if self.settings.motion.path == "float":
             return trajectory
-        return trajectory.schedule(self.settings.cancel.horizon_us, step_us=self.settings.motion.schedule_step_us)
+        step_us = self.settings.motion.schedule_step_us
+        start_us = min(max(self.first_us, int(trajectory.t_us[0])), int(trajectory.t_us[-1]))
+        entries = (int(trajectory.t_us[-1]) - start_us) // step_us + 1
+        if entries > MAX_ENTRIES:
+            raise ConfigError(
+                f"the motion of {trajectory.source} needs {entries:,} schedule entries, at most {MAX_ENTRIES:,} fit: "
+                f"make --schedule-step-us longer than {step_us}, or --motion-path float"
+            )
+        return trajectory.schedule(self.settings.cancel.horizon_us, start_us=start_us, step_us=step_us)
 
     def _wanted_controls(self) -> tuple[str, ...]:
-        return CONTROLS if self.settings.report.controls else ()
+        return tuple(CONTROLS) if self.settings.report.controls else ()
 
-    def _control(self, name: str, counted_from_us: int) -> _Control:
+    def _control(self, name: str, counted_from_us: int) -> Control:
         """Build one control: the same canceller under another motion, or the same motion over shuffled pixels."""
-        motions = {
-            "zero_motion": MotionSchedule.still(),
-            "reversed_motion": self._motion(self.trajectory.reversed()),
-            "time_shuffled": self.motion,
-        }
-        canceller = Canceller(
-            self.settings.cancel, motions[name], width=self.width, height=self.height, track_source=False
-        )
-        shuffled = name == "time_shuffled"
-        rng = np.random.default_rng(self.settings.report.shuffle_seed) if shuffled else None
-        return _Control(canceller, Tally(self.region, counted_from_us), rng)
+        motion = self.motion
+        if name == "zero_motion":
+            motion = MotionSchedule.still()
+        elif name == "reversed_motion":
+            motion = self._motion(self.trajectory.reversed())
+        canceller = Canceller(self.settings.cancel, motion, width=self.width, height=self.height, track_source=False)
+        tally = Tally(self.region, counted_from_us)
+        if name == "time_shuffled":
+            return ShuffledControl(canceller, tally, self.settings.report.shuffle_seed)
+        return Control(canceller, tally)

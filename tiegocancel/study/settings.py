@@ -35,7 +35,7 @@ class ReportSettings:
 
     ``disc_radius_px``: region that turns, ``None`` guesses it from where the density of events drops;
     ``controls``: run zero motion, reversed motion and shuffled times too; ``shuffle_seed`` of the last;
-    ``chunk_events`` a chunk of processing and a block of shuffling.
+    ``chunk_events`` a chunk of processing, which changes no number.
     """
 
     disc_radius_px: float | None = None
@@ -46,6 +46,8 @@ class ReportSettings:
     def __post_init__(self) -> None:
         if self.disc_radius_px is not None and not 0 <= self.disc_radius_px < float("inf"):
             raise ValueError(f"disc_radius_px must be a finite number of at least 0 px, not {self.disc_radius_px!r}")
+        if not 0 <= self.shuffle_seed < 1 << 64:
+            raise ValueError(f"shuffle_seed must be from 0 to 2^64 − 1, not {self.shuffle_seed}")
         if not 1 <= self.chunk_events <= 1 << 24:
             raise ValueError(f"chunk_events must be from 1 to {1 << 24}, not {self.chunk_events}")
 
@@ -68,8 +70,8 @@ class SimulateSettings:
     def __post_init__(self) -> None:
         if not 0 <= self.duration_s <= 3600:
             raise ValueError(f"duration_s must be from 0 to 3600 s, not {self.duration_s!r}")
-        if self.seed < 0:
-            raise ValueError(f"seed must not be negative, not {self.seed}")
+        if not 0 <= self.seed < 1 << 64:
+            raise ValueError(f"seed must be from 0 to 2^64 − 1, not {self.seed}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -99,3 +99,28 @@ def test_a_target_of_unknown_suffix_is_a_usage_error(events: Events, tmp_path: P
     write_events(tmp_path / "a.npz", events)
     with pytest.raises(ConfigError, match="suffix"):
         call(tmp_path / "a.npz", tmp_path / "a.hdf")
+
+
+@pytest.mark.parametrize("target", ["b.csv", "b.npy", "b.npz", "b.raw"])
+def test_a_format_without_room_for_the_size_is_told_with_the_flags(
+    target: str, events: Events, tmp_path: Path, call: Call
+) -> None:
+    write_events(tmp_path / "a.npz", events)
+    out, err = call(tmp_path / "a.npz", tmp_path / target, "--json")
+    name = target.split(".")[1]
+    note = f"{name} holds no sensor size: pass --width 64 --height 48 when reading it"
+    assert (f"note: {note}" in err.splitlines()) == (name in ("csv", "npy"))
+    assert (note in json.loads(out)["notes"]) == (name in ("csv", "npy"))
+
+
+def test_notes_are_told_as_notes(events: Events, tmp_path: Path, call: Call) -> None:
+    write_events(tmp_path / "a.csv", events)
+    _, err = call(tmp_path / "a.csv", tmp_path / "b.npz")
+    assert "note: sensor size derived from the largest coordinate: 64x48" in err.splitlines()
+
+
+def test_a_fault_before_the_first_event_leaves_no_file(tmp_path: Path, call: Call) -> None:
+    (tmp_path / "a.csv").write_text("x,y,p,t_us\n1,2,7,4\n")
+    with pytest.raises(InputError, match="row 2"):
+        call(tmp_path / "a.csv", tmp_path / "b.raw", "--width", "64", "--height", "48")
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["a.csv"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -200,3 +201,62 @@ def test_demo_takes_a_scene_from_a_file(tmp_path: Path, capsys: pytest.CaptureFi
         capsys, "demo", "--duration", "0.08", "--config", config, "--out", tmp_path / "o", "--no-figures", "--json"
     )
     assert numbers["sensor"] == {"width": 160, "height": 90}
+
+
+def test_run_refuses_to_overwrite_its_input(source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run_json(capsys, "run", source, "--motion", MOTION, "--no-figures", "--out", tmp_path, "--json")
+    residual = tmp_path / "residual.npz"
+    before = residual.read_bytes()
+    assert main(["run", str(residual), "--motion", MOTION, "--no-figures", "--out", str(tmp_path)]) == 2
+    assert "residual.npz there is the input itself" in capsys.readouterr().err
+    assert residual.read_bytes() == before
+
+
+def test_a_folder_used_again_holds_only_the_new_run_and_what_is_not_ours(
+    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "mine.txt").write_text("keep", encoding="utf-8")
+    run_json(capsys, "run", source, "--motion", MOTION, "--residual", "csv", "--out", tmp_path, "--json")
+    assert (tmp_path / "residual.csv").exists()
+    run_json(capsys, "run", source, "--motion", MOTION, "--no-figures", "--out", tmp_path, "--json")
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "manifest.json", "mine.txt", "report.html", "residual.npz",
+    ]  # fmt: skip
+    manifest = json.loads((tmp_path / "manifest.json").read_text(encoding="utf-8"))
+    assert manifest["outputs"] == ["report.html", "residual.npz"]
+
+
+def test_a_centre_left_of_the_sensor_may_be_given(
+    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    numbers = run_json(capsys, "run", source, "--motion", "-300,60,0.3", "--no-figures", "--out", tmp_path, "--json")
+    assert numbers["motion"]["center_px"] == [-300, 60]  # type: ignore[index]
+    assert numbers["disc_seen"] is False
+
+
+def test_motion_known_for_another_time_is_told(
+    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    track = tmp_path / "far.csv"
+    track.write_text("timestamp,center_x,center_y,omega_rad_s\n100,60,50,20\n101,60,50,20\n", encoding="utf-8")
+    numbers = run_json(capsys, "run", source, "--motion", track, "--no-figures", "--out", tmp_path / "o", "--json")
+    notes = " ".join(numbers["notes"])  # type: ignore[arg-type]
+    assert "known from 100.000000 to 101.000000 s" in notes
+    assert "for 100% of that time" in notes
+
+
+def test_a_schedule_beyond_memory_is_refused_by_name(
+    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    track = tmp_path / "epoch.csv"
+    track.write_text("timestamp,center_x,center_y,omega_rad_s\n0,60,50,20\n1700000000,60,50,20\n", encoding="utf-8")
+    assert main(["run", str(source), "--motion", str(track), "--out", str(tmp_path / "o")]) == 2
+    assert "--schedule-step-us" in capsys.readouterr().err
+    assert main(["run", str(source), "--motion", str(track), "--motion-path", "float", "--out", str(tmp_path)]) == 0
+
+
+def test_a_file_name_that_is_no_text_is_reported_on(source: Path, tmp_path: Path) -> None:
+    odd = tmp_path / os.fsdecode(b"odd\xff.npz")
+    odd.write_bytes(source.read_bytes())
+    assert main(["run", str(odd), "--motion", MOTION, "--no-figures", "--out", str(tmp_path / "o")]) == 0
+    assert json.loads((tmp_path / "o" / "manifest.json").read_text(encoding="utf-8"))["results"]["events"] > 0

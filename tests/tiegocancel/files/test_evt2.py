@@ -140,3 +140,21 @@ def test_a_file_of_another_tool_is_read(
         rows[name] = getattr(events, name)
     expelliarmus.Wizard(encoding="evt2").save(fpath=tmp_path / "a.raw", arr=rows)
     assert same(read_events(tmp_path / "a.raw", format="evt2"), events)
+
+
+@pytest.mark.parametrize(
+    "line", [b"% geometry 48x", b"% format EVT2;height=48;width=", b"% evt 2.0\n% Height 48\n% Width "]
+)
+@pytest.mark.parametrize("digits", [7, 30, 4000])
+def test_a_size_beyond_all_bounds_is_a_short_line(line: bytes, digits: int, saved: Save) -> None:
+    path = saved("a.raw", line + b"7" * digits + b"\n% end\n" + raw(high(1), cd(0, 1, 1, 1)))
+    with pytest.raises(InputError, match=r"header: .*7777777.*expected.*px") as caught:
+        open_events(path, format="evt2")
+    assert len(caught.value.problem) < 150
+
+
+def test_the_header_of_another_encoding_is_refused(saved: Save) -> None:
+    with pytest.raises(InputError, match=r"says encoding 'evt2', expected EVT 3\.0"):
+        open_events(saved("a.raw", HEADER), format="evt3")
+    with pytest.raises(InputError, match=r"says encoding 'evt3', expected EVT 2\.0"):
+        open_events(saved("a.raw", HEADER.replace(b"EVT2", b"EVT3")), format="evt2")

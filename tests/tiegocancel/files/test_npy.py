@@ -154,3 +154,31 @@ def test_a_truncated_array_is_named_by_its_size(tmp_path: Path, stream: Callable
     content = npy_bytes(stream().to_structured())
     with pytest.raises(InputError, match=rf"byte {len(content) - 5}: ends after"):
         open_events(saved("a.npy", content[:-5]))
+
+
+@pytest.mark.parametrize(
+    "shape", ["(0x1" + "0" * 4000 + ", 4)", "(9223372036854775808,)", "(" + "1, " * 65 + ")", "(" + "9" * 5000 + ", 4)"]
+)
+def test_an_absurd_shape_is_no_fault_of_an_archive(shape: str, saved: Save) -> None:
+    text = f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}}}".encode().ljust(117) + b"\n"
+    content = b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text
+    with pytest.raises(InputError, match=r"header: .*shape") as caught:
+        open_events(saved("a.npy", content))
+    assert "ZIP" not in str(caught.value)
+    assert len(caught.value.problem) < 200
+
+
+def test_a_product_of_sides_that_is_absurd_is_a_short_line(saved: Save) -> None:
+    sides = ", ".join(["4611686018427387904"] * 60)
+    text = f"{{'descr': '<f8', 'fortran_order': False, 'shape': ({sides})}}".encode() + b"\n"
+    content = b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text
+    with pytest.raises(InputError, match="ends after 0 bytes") as caught:
+        open_events(saved("a.npy", content))
+    assert len(caught.value.problem) < 300
+
+
+def test_unsigned_columns_are_told_apart_by_content(tmp_path: Path) -> None:
+    # Read as x, y, p, t the times would fall: 5, 3, 1.
+    # Both orders fit, and the times of x, y, p, t would be 0, 1, 0.
+    np.save(tmp_path / "a.npy", np.array([[5, 1, 1, 0], [6, 2, 1, 1], [7, 3, 0, 0]], np.uint64))
+    assert read_events(tmp_path / "a.npy", time_unit="us").t.tolist() == [5, 6, 7]

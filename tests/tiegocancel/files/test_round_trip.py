@@ -187,3 +187,53 @@ def test_chunks_that_do_not_belong_together_are_a_programmers_error(
 def test_a_place_that_cannot_be_written_is_one_line(target: str, problem: str, tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=problem):
         open_writer(tmp_path / target, width=1, height=1)
+
+
+def leave_at_once(path: Path, **options: Any) -> None:
+    with open_writer(path, width=64, height=48, labelled=True, **options):
+        raise RuntimeError("stop")
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_an_exception_before_the_first_event_leaves_no_file(name: str, tmp_path: Path) -> None:
+    with pytest.raises(RuntimeError, match="stop"):
+        leave_at_once(tmp_path / "file", format=name)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_a_body_that_ends_without_events_leaves_a_file(name: str, tmp_path: Path) -> None:
+    with open_writer(tmp_path / "file", width=64, height=48, format=name):
+        pass
+    assert (tmp_path / "file").stat().st_size > 0
+
+
+def test_an_archive_that_could_not_be_replaced_stays(
+    tmp_path: Path, stream: Callable[..., Events], same: Callable[..., bool]
+) -> None:
+    events = stream(labelled=True)
+    write_events(tmp_path / "a.npz", events)
+    with pytest.raises(RuntimeError, match="stop"):
+        leave_at_once(tmp_path / "a.npz")
+    assert same(read_events(tmp_path / "a.npz"), events)
+    assert [file.name for file in tmp_path.iterdir()] == ["a.npz"]
+
+
+@pytest.mark.skipif(not Path("/dev/null").exists(), reason="no /dev/null here")
+def test_what_is_no_regular_file_is_never_removed(tmp_path: Path) -> None:
+    (tmp_path / "link.csv").symlink_to("/dev/null")
+    with pytest.raises(RuntimeError, match="stop"):
+        leave_at_once(tmp_path / "link.csv")
+    assert (tmp_path / "link.csv").is_symlink()
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_a_writer_tells_what_its_format_cannot_hold(name: str, tmp_path: Path, stream: Callable[..., Events]) -> None:
+    events = stream(width=65, height=49)[1:]
+    inside = (events.x < 60) & (events.y < 40)
+    events = Events(events.t[inside], events.x[inside], events.y[inside], events.p[inside], 65, 49)
+    with open_writer(tmp_path / "file", width=65, height=49, format=name) as writer:
+        writer.write(events)
+    back = read_events(tmp_path / "file")
+    assert writer.holds_size == ((back.width, back.height) == (65, 49))
+    assert writer.holds_size == (not any("--width 65 --height 49" in note for note in writer.notes))

@@ -202,3 +202,10 @@ def test_plain_and_line_by_line_parsing_agree(
         path = Path(folder) / "a.csv"
         path.write_text("x,y,p,t_us\n" + "".join(lines))
         assert columns_of(path, width=64, height=48) == tuple([row[k] for row in rows] for k in (3, 0, 1, 2))
+
+
+@pytest.mark.parametrize("digits", [10, 4299, 5000, 60_000])
+def test_a_first_row_that_is_no_size_is_one_clear_line(digits: int, saved: Save) -> None:
+    with pytest.raises(InputError, match=r"row 1: found '1111.* expected a sensor size") as caught:
+        open_events(saved("a.txt", "1" * digits + " 5\n11 3 4 1\n"), time_unit="us")
+    assert len(caught.value.problem) < 200

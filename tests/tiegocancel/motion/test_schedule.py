@@ -110,3 +110,15 @@ def test_rotations_that_are_not_finite_are_refused(center, omega):
 def test_a_centre_too_far_for_the_format_is_refused():
     with pytest.raises(ValueError, match="too far away"):
         MotionSchedule.rotation(center_px=(1e12, 0.0), omega_rad_s=3.0, horizon_us=8000)
+
+
+@pytest.mark.parametrize("value", [-(2**63), 2**44 + 1, -(2**44) - 1])
+def test_a_coefficient_beyond_the_bound_is_refused(value: int) -> None:
+    with pytest.raises(ValueError, match="within"):
+        MotionSchedule(np.zeros(1, np.int64), np.array([[0, 0, value, 0, 0, 0]]))
+
+
+def test_unsigned_values_beyond_64_bits_with_a_sign_are_not_wrapped() -> None:
+    huge = np.array([2**64 - 5], np.uint64)
+    with pytest.raises(ValueError, match="must fit 64 bits with a sign"):
+        MotionSchedule(huge, np.zeros((1, 6), np.int64))

@@ -41,7 +41,7 @@ class Outline(HTMLParser):
 def result_of(events: Events, horizon_us: int = 20) -> RunResult:
     trajectory = RotationTrajectory.constant(center_px=(events.width / 2, events.height / 2), omega_rad_s=0.0)
     settings = Settings(cancel=CancelConfig(horizon_us=horizon_us, tolerance_us=5))
-    result = run_stream([events], settings, trajectory, width=events.width, height=events.height)
+    result = run_stream([events], settings, trajectory)
     assert result is not None
     return result
 

@@ -1,0 +1,46 @@
+"""Say the main numbers of a run in a few lines of text."""
+
+from __future__ import annotations
+
+from tiegocancel.metrics import Share
+from tiegocancel.study import RunResult, Verdict
+from tiegocancel.study.controls import CONTROLS
+from tiegocancel.units import rate_text
+
+__all__ = ["summary_text"]
+
+
+def summary_text(result: RunResult, verdict: Verdict) -> str:
+    """Return the headline, the ratios beside their controls and what they rest on."""
+    (cx, cy), omega = result.trajectory.mean(start_us=result.first_us, stop_us=result.last_us)
+    share = result.tally.share()
+    lines = [
+        verdict.headline,
+        f"  events       {result.counters.events:,} in {result.duration_s:.3f} s, "
+        f"{result.counters.suppressed:,} suppressed",
+        f"  counted      {share.events:,}; {result.tally.warm_up_events:,} left out, warm-up "
+        f"{result.settings.cancel.warm_up_us / 1000:g} ms",
+        f"  motion       centre ({cx:.1f}, {cy:.1f}) px, ω {omega:+.4f} rad/s ({result.trajectory.source})",
+        f"  {'':22}all" + ("      disc" if result.lead_region else ""),
+    ]
+    tallies = {"cancellation ratio": result.tally}
+    tallies |= {CONTROLS[name].label: tally for name, tally in result.controls.items()}
+    for name, tally in tallies.items():
+        line = f"  {name:20}{_percent(tally.share())}"
+        lines.append(line + (f"    {_percent(tally.share(on_disc=True))}" if result.lead_region else ""))
+    selectivity = result.tally.selectivity()
+    if selectivity is not None:
+        causes = ", ".join(f"{cause} {_text(selectivity[cause])}" for cause in ("ego", "mover", "noise"))
+        j = selectivity["j"]
+        lines.append(f"  by label     {causes}" + ("" if j is None else f": J = {j:.3f}"))
+    speed = rate_text(result.counters.events / result.seconds) if result.seconds else "–"
+    lines.append(f"  speed        {speed}; state {result.state.total_kib:,.0f} KiB")
+    return "\n".join(lines) + "\n"
+
+
+def _percent(share: Share) -> str:
+    return f"{share.ratio:6.1%}" if share.events else f"{'–':>6}"
+
+
+def _text(value: float | None) -> str:
+    return "–" if value is None else f"{value:.1%}"

@@ -1,0 +1,92 @@
+"""Run what a ratio has to be compared with: the same events under motions that are wrong, and by chance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tiegocancel.events import Events
+from tiegocancel.matching.canceller import Canceller
+from tiegocancel.metrics import Tally
+
+__all__ = ["CONTROLS", "SHUFFLE_BLOCK", "Control", "ControlKind", "ShuffledControl"]
+
+SHUFFLE_BLOCK = 1 << 19
+"""Events within which pixels are permuted against times, whatever the chunks of the stream."""
+
+
+@dataclass(frozen=True, slots=True)
+class ControlKind:
+    """``name`` in results, ``label`` and ``meaning`` in words."""
+
+    name: str
+    label: str
+    meaning: str
+
+
+CONTROLS = {
+    kind.name: kind
+    for kind in (
+        ControlKind("zero_motion", "zero motion", "predict “same place”: what slow motion and a wide gate give"),
+        ControlKind("reversed_motion", "reversed motion", "turn the other way: wrong everywhere but at the centre"),
+        ControlKind("time_shuffled", "shuffled times", "true motion on pixels permuted against their times: chance"),
+    )
+}
+
+
+class Control:
+    """Decide and count the events of the main run with another canceller."""
+
+    def __init__(self, canceller: Canceller, tally: Tally) -> None:
+        self.canceller, self.tally = canceller, tally
+
+    def process(self, events: Events) -> None:
+        """Take a chunk."""
+        self.tally.add(events, self.canceller.process(events).suppressed)
+
+    def finish(self) -> None:
+        """Take what is still held back."""
+
+
+class ShuffledControl(Control):
+    """Permute pixel, polarity and label against the times first, in blocks of :data:`SHUFFLE_BLOCK` events.
+
+    ``shortest_us`` is the span of the shortest full block, or of the only one: where that is not much longer than the
+    horizon, some structure survives the shuffle and the control stands too high.
+    """
+
+    def __init__(self, canceller: Canceller, tally: Tally, seed: int) -> None:
+        super().__init__(canceller, tally)
+        self._rng = np.random.default_rng(seed)
+        self._held: list[Events] = []
+        self._count = 0
+        self.shortest_us: int | None = None
+
+    def process(self, events: Events) -> None:
+        """Take a chunk; decide whenever a block is full."""
+        self._held.append(events)
+        self._count += len(events)
+        if self._count < SHUFFLE_BLOCK:
+            return
+        whole = Events.concatenate(self._held)
+        done = self._count - self._count % SHUFFLE_BLOCK
+        for first in range(0, done, SHUFFLE_BLOCK):
+            block = whole[first : first + SHUFFLE_BLOCK]
+            self.shortest_us = min(block.span_us, block.span_us if self.shortest_us is None else self.shortest_us)
+            self._decide(block)
+        self._held, self._count = [whole[done:]], self._count - done
+
+    def finish(self) -> None:
+        """Decide the last block, shorter than the others."""
+        if self._count:
+            block = Events.concatenate(self._held)
+            self.shortest_us = block.span_us if self.shortest_us is None else self.shortest_us
+            self._decide(block)
+        self._held, self._count = [], 0
+
+    def _decide(self, block: Events) -> None:
+        order = self._rng.permutation(len(block))
+        label = None if block.label is None else block.label[order]
+        shuffled = Events(block.t, block.x[order], block.y[order], block.p[order], block.width, block.height, label)
+        super().process(shuffled)
