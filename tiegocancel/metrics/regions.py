@@ -38,7 +38,7 @@ class DiscRegion:
             ring = (radius / ring_px).astype(np.int32) - nearest
             self._codes[row * width : (row + 1) * width] = 2 * ring + (radius <= radius_px)
         self.rings = int(self._codes.max() >> 1) + 1
-        self.ring_edges_px: NDArray[np.float64] = (nearest + np.arange(self.rings + 1)) * ring_px
+        self.ring_edges_px: NDArray[np.float64] = (nearest + np.arange(self.rings + 1, dtype=np.float64)) * ring_px
         self.areas_px = np.bincount(self._codes, minlength=2 * self.rings).reshape(self.rings, 2)
 
     def codes(self, events: Events) -> NDArray[np.int32]:

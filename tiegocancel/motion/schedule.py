@@ -51,6 +51,8 @@ class MotionSchedule:
         cls, *, center_px: tuple[float, float], omega_rad_s: float, horizon_us: int, t_us: int = 0
     ) -> MotionSchedule:
         """Return a constant rotation about ``center_px`` = (cx, cy); a positive ω turns x towards y."""
+        if horizon_us < 0:
+            raise ValueError(f"horizon_us must not be negative, not {horizon_us}")
         row = rotation_coefficients(center_px[0], center_px[1], omega_rad_s, horizon_us)
         return cls(np.array([t_us], np.int64), row[None, :])
 
@@ -91,8 +93,6 @@ def rotation_coefficients(
         np.asarray(center_y_px, np.float64),
         np.asarray(omega_rad_s, np.float64),
     )
-    if horizon_us < 0:
-        raise ValueError(f"horizon_us must not be negative, not {horizon_us}")
     if not (np.isfinite(cx).all() and np.isfinite(cy).all() and np.isfinite(omega).all()):
         raise ValueError("centre and angular velocity must be finite")
     theta = omega * (horizon_us * 1e-6)
