@@ -1,4 +1,4 @@
-"""Drain, match and predict a launch of events, in order, over packed state that the host owns.
+"""Drain, match and store the predictions of a launch of events, in order, over packed state that the host owns.
 
 A cell is 4 bytes, ``t' << 2 | p << 1 | valid`` with ``t'`` in 30 bits relative to the launch's base time; 0 is empty.
 The table carries a border as wide as the spatial gate, so that a window never needs a bounds test. Gate in time,
@@ -10,29 +10,26 @@ from functools import cache
 
 from tiegocancel.kernels.runtime import start, ti
 
-__all__ = ["CURSORS", "MAX_UNROLLED", "cancel"]
-
-CURSORS = ("head", "pending", "entry", "events", "suppressed", "predicted", "outside", "overflow", "overwritten",
-           "ring_high_water")  # fmt: skip
-"""Names of ``cursors`` int64[10]: where ring and schedule stand, then the counters."""
+__all__ = ["MAX_UNROLLED", "cancel"]
 
 MAX_UNROLLED = 32
 """A window of more offsets than this is searched by a loop instead of unrolled code."""
 
 
-def cancel(*, polarity, offsets, by_schedule, track_source, state):
+def cancel(*, polarity, offsets, track_source, state):
     """Run one launch; ``state`` holds the kernel's arguments by name, as :func:`_kernel` lists them.
 
     ``polarity``: opposite, equal or ignore; ``offsets``: window as linear cell offsets, in order of preference;
-    ``by_schedule``: predict with ``coefficients``, else ``ahead`` holds the targets; ``track_source``: fill ``source``.
+    ``track_source``: fill ``source``. ``cursors`` are the ring's head and number of pending predictions, then the
+    counts of events, suppressed, predicted, outside, overflow, overwritten, and the most ever pending.
     """
     start()
     window = tuple(offsets.tolist()) if len(offsets) <= MAX_UNROLLED else ()
-    _kernel(polarity, window, by_schedule, track_source)(**state)
+    _kernel(polarity, window, track_source)(**state)
 
 
 @cache
-def _kernel(polarity, window, by_schedule, track_source):
+def _kernel(polarity, window, track_source):
     """Compile one variant; ``window`` holds linear offsets to compile in, so it is one for each sensor width and gate.
 
     An empty ``window`` searches the kernel's argument ``offsets`` in a loop.
@@ -47,8 +44,6 @@ def _kernel(polarity, window, by_schedule, track_source):
         base_us: ti.i64,  # 0 ≤ t − base < 2^29
         horizon_us: ti.u32,
         gate_us: ti.u32,
-        width: ti.i32,
-        height: ti.i32,
         stride: ti.i32,  # cells from one row of the table to the next
         origin: ti.i32,  # cell of pixel (0, 0)
         capacity: ti.i32,
@@ -56,15 +51,13 @@ def _kernel(polarity, window, by_schedule, track_source):
         x: ti.types.ndarray(dtype=ti.u16, ndim=1),  # [n] px
         y: ti.types.ndarray(dtype=ti.u16, ndim=1),  # [n] px
         p: ti.types.ndarray(dtype=ti.u8, ndim=1),  # [n]
-        ahead: ti.types.ndarray(dtype=ti.i32, ndim=1),  # [n] cell of the prediction, −1 outside; [1] when by_schedule
+        ahead: ti.types.ndarray(dtype=ti.i32, ndim=1),  # [n or more] cell of the prediction, −1 outside
         offsets: ti.types.ndarray(dtype=ti.i32, ndim=1),  # [window] linear, nearest first
-        schedule_t: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [K] µs
-        coefficients: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [6 K] a b c d e f
-        cells: ti.types.ndarray(dtype=ti.u32, ndim=1),  # [table + 1], the last a spare for events without a match
-        cell_source: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [table + 1], the spare holds −1; [1] when not tracked
+        cells: ti.types.ndarray(dtype=ti.u32, ndim=1),  # [table], 0 where empty
+        cell_source: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [table], [1] when not tracked
         ring: ti.types.ndarray(dtype=ti.u64, ndim=1),  # [capacity] cell index << 32 | packed cell
         ring_source: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [capacity], [1] when not tracked
-        cursors: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [10], see CURSORS
+        cursors: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [9], see cancel
         suppressed: ti.types.ndarray(dtype=ti.u8, ndim=1),  # [n] out
         source: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [n] out, [1] when not tracked
     ):
@@ -72,22 +65,16 @@ def _kernel(polarity, window, by_schedule, track_source):
         for _ in range(1):  # one serial task: what follows lives in registers, not in global temporaries
             head = ti.cast(cursors[0], ti.i32)
             pending = ti.cast(cursors[1], ti.i32)
-            entry = ti.cast(cursors[2], ti.i32) - 1  # the first event loads the entry that was in force
-            index = cursors[3]
+            index = cursors[2]
             hits = ti.u32(0)
             outside = ti.i64(0)
             overflow = ti.i64(0)
             overwritten = ti.u32(0)
-            high_water = ti.cast(cursors[9], ti.i32)
-            entries = schedule_t.shape[0]
-            next_t = ti.i64(-9223372036854775808)
-            a, b, c = ti.i64(0), ti.i64(0), ti.i64(0)
-            d, e, f = ti.i64(0), ti.i64(0), ti.i64(0)
+            high_water = ti.cast(cursors[8], ti.i32)
             due = ti.u32(0xFFFFFFFF)  # relative t' of the ring's head; nothing pending: never
             if pending > 0:
                 due = ti.cast(ring[head], ti.u32) >> 2
             twice = gate_us << 1
-            spare = cells.shape[0] - 1
 
             for i in range(first, first + count):
                 at = t[i]
@@ -117,7 +104,7 @@ def _kernel(polarity, window, by_schedule, track_source):
 
                 # 2. match
                 want = ((now - gate_us) << 2) | ((sign ^ ti.u32(flip)) << 1) | ti.u32(blur | 1)
-                met = spare
+                met = 0
                 searching = True  # a constant on each path, so that the unrolled search ends in one jump
                 if ti.static(len(window) > 0):
                     for offset in ti.static(window):
@@ -135,35 +122,21 @@ def _kernel(polarity, window, by_schedule, track_source):
                         k += 1
                         if ((gap >> 2) | (gap << 30)) <= twice:
                             met = beside
+                            searching = False
                             k = offsets.shape[0]
-                cells[met] = ti.u32(0)
-                suppressed[i] = ti.cast(met != spare, ti.u8)
-                hits += ti.cast(met != spare, ti.u32)
-                if ti.static(track_source):
-                    source[i] = cell_source[met]
-
-                # 3. predict
-                target = -1
-                if ti.static(by_schedule):
-                    while at >= next_t:
-                        entry += 1
-                        a = coefficients[6 * entry]
-                        b = coefficients[6 * entry + 1]
-                        c = coefficients[6 * entry + 2] + 32768
-                        d = coefficients[6 * entry + 3]
-                        e = coefficients[6 * entry + 4]
-                        f = coefficients[6 * entry + 5] + 32768
-                        next_t = ti.i64(9223372036854775807)
-                        if entry + 1 < entries:
-                            next_t = schedule_t[entry + 1]
-                    wide = ti.cast(column, ti.i64)
-                    tall = ti.cast(row, ti.i64)
-                    ahead_x = ((wide << 16) + a * wide + b * tall + c) >> 16
-                    ahead_y = ((tall << 16) + d * wide + e * tall + f) >> 16
-                    if ahead_x >= 0 and ahead_x < width and ahead_y >= 0 and ahead_y < height:
-                        target = origin + ti.cast(ahead_y, ti.i32) * stride + ti.cast(ahead_x, ti.i32)
+                if searching:
+                    suppressed[i] = ti.u8(0)
+                    if ti.static(track_source):
+                        source[i] = ti.i64(-1)
                 else:
-                    target = ahead[i]
+                    cells[met] = ti.u32(0)
+                    suppressed[i] = ti.u8(1)
+                    hits += 1
+                    if ti.static(track_source):
+                        source[i] = cell_source[met]
+
+                # 3. store the prediction
+                target = ahead[i]
                 if target < 0:
                     outside += 1
                 elif pending == capacity:
@@ -186,13 +159,12 @@ def _kernel(polarity, window, by_schedule, track_source):
 
             cursors[0] = head
             cursors[1] = pending
-            cursors[2] = ti.max(entry, cursors[2])
-            cursors[3] = index
-            cursors[4] += hits
-            cursors[5] += count - outside - overflow
-            cursors[6] += outside
-            cursors[7] += overflow
-            cursors[8] += overwritten
-            cursors[9] = high_water
+            cursors[2] = index
+            cursors[3] += hits
+            cursors[4] += count - outside - overflow
+            cursors[5] += outside
+            cursors[6] += overflow
+            cursors[7] += overwritten
+            cursors[8] = high_water
 
     return run

@@ -80,6 +80,7 @@ def run_c(
     """Time the C code over the stream; state is laid out by a Canceller, so both work on the same arrays."""
     state = Canceller(config, motion, width=WIDTH, height=HEIGHT, track_source=track)._arguments
     totals = np.zeros(7, np.int64)
+    coefficients = np.array(motion.coefficients)
     parts = []
     base = int(events.t[0]) - config.tolerance_us
     started = time.perf_counter()
@@ -91,7 +92,7 @@ def run_c(
             ctypes.c_int64(len(part)), pointer(part.t), pointer(part.x), pointer(part.y), pointer(part.p),
             ctypes.c_int64(base), ctypes.c_uint32(config.horizon_us), ctypes.c_uint32(config.tolerance_us),
             WIDTH, HEIGHT, state["stride"], state["origin"], state["capacity"], pointer(state["offsets"]),
-            len(state["offsets"]), pointer(state["coefficients"]), pointer(state["cells"]),
+            len(state["offsets"]), pointer(coefficients), pointer(state["cells"]),
             pointer(state["cell_source"]) if track else None, pointer(state["ring"]),
             pointer(state["ring_source"]) if track else None, pointer(totals), pointer(suppressed),
             pointer(source) if track else None, ctypes.c_int64(first),

@@ -84,27 +84,22 @@ class Canceller:
         table = (self.height + 2 * border) * self._stride + border
         if table >= 1 << 31:
             raise ValueError(f"a table of {table} cells for {width}×{height} px is beyond 2^31")
-        tracked = table + 1 if track_source else 1
-        schedule = motion if isinstance(motion, MotionSchedule) else MotionSchedule.still()
-        self._cells = np.zeros(table + 1, np.uint32)
+        tracked = table if track_source else 1
+        self._cells = np.zeros(table, np.uint32)
         self._ring = np.zeros(config.ring_capacity, np.uint64)
-        self._cursors = np.zeros(10, np.int64)
+        self._cursors = np.zeros(9, np.int64)
         self._base_us: int | None = None
         self._last_us: int | None = None
-        self._unused = np.zeros(1, np.int32)
+        self._ahead = np.zeros(1, np.int32)  # where a chunk's predictions go; kept, for it costs time to map
         self._arguments: dict[str, Any] = {
             "horizon_us": config.horizon_us,
             "gate_us": config.tolerance_us,
-            "width": self.width,
-            "height": self.height,
             "stride": self._stride,
             "origin": self._origin,
             "capacity": config.ring_capacity,
             "offsets": np.array([dy * self._stride + dx for dx, dy in config.offsets], np.int32),
-            "schedule_t": np.array(schedule.t_us),
-            "coefficients": np.array(schedule.coefficients).ravel(),
             "cells": self._cells,
-            "cell_source": np.full(tracked, -1, np.int64),
+            "cell_source": np.zeros(tracked, np.int64),
             "ring": self._ring,
             "ring_source": np.zeros(config.ring_capacity if track_source else 1, np.int64),
             "cursors": self._cursors,
@@ -114,7 +109,7 @@ class Canceller:
     def counters(self) -> Counters:
         """Return the counts so far."""
         return Counters(
-            **dict(zip((field.name for field in fields(Counters)), self._cursors[3:].tolist(), strict=True))
+            **dict(zip((field.name for field in fields(Counters)), self._cursors[2:].tolist(), strict=True))
         )
 
     @property
@@ -125,7 +120,8 @@ class Canceller:
     def prepare(self) -> None:
         """Compile the kernel now instead of at the first event; it decides nothing."""
         one = Events([0], [0], [0], [0], self.width, self.height)  # type: ignore[arg-type]
-        self._launch(one, 0, 0, self._unused, np.zeros(1, np.uint8), np.zeros(1, np.int64), base_us=0)
+        self._predict(one)
+        self._launch(one, 0, 0, np.zeros(1, np.uint8), np.zeros(1, np.int64), base_us=0)
 
     def process(self, events: Events) -> Decisions:
         """Decide every event of a chunk; chunks may be cut anywhere and may be empty.
@@ -141,9 +137,9 @@ class Canceller:
         source = np.empty(count if self.track_source else 1, np.int64)
         if count:
             self._check_order(events)
-            ahead = self._ahead(events) if isinstance(self.motion, RotationTrajectory) else self._unused
+            self._predict(events)
             for first, last, base_us in self._launches(events.t):
-                self._launch(events, first, last, ahead, suppressed, source, base_us=base_us)
+                self._launch(events, first, last, suppressed, source, base_us=base_us)
                 self._last_us = int(events.t[last - 1])
         return Decisions(suppressed=suppressed.view(np.bool_), source=source if self.track_source else None)
 
@@ -172,7 +168,6 @@ class Canceller:
         events: Events,
         first: int,
         last: int,
-        ahead: NDArray[np.int32],
         suppressed: NDArray[np.uint8],
         source: NDArray[np.int64],
         *,
@@ -184,7 +179,6 @@ class Canceller:
         cancel(
             polarity=self.config.polarity,
             offsets=self._arguments["offsets"],
-            by_schedule=isinstance(self.motion, MotionSchedule),
             track_source=self.track_source,
             state={
                 **self._arguments,
@@ -195,18 +189,40 @@ class Canceller:
                 "x": events.x,
                 "y": events.y,
                 "p": events.p,
-                "ahead": ahead,
+                "ahead": self._ahead,
                 "suppressed": suppressed,
                 "source": source,
             },
         )
 
-    def _ahead(self, events: Events) -> NDArray[np.int32]:
-        """Predict by the float path, as cells of the table; −1 beyond the sensor."""
-        assert isinstance(self.motion, RotationTrajectory)
+    def _predict(self, events: Events) -> None:
+        """Fill ``_ahead`` with the cell of each event's prediction, −1 beyond the sensor."""
+        if len(self._ahead) < len(events):
+            self._ahead = np.empty(len(events), np.int32)
+        if isinstance(self.motion, MotionSchedule):
+            self._predict_by_schedule(events, self.motion)
+            return
         ahead_x, ahead_y = self.motion.predict(events.t, events.x, events.y, self.config.horizon_us)
         inside = (ahead_x >= 0) & (ahead_x < self.width) & (ahead_y >= 0) & (ahead_y < self.height)
-        return np.where(inside, self._origin + ahead_y * self._stride + ahead_x, -1).astype(np.int32)
+        self._ahead[: len(events)] = np.where(inside, self._origin + ahead_y * self._stride + ahead_x, -1)
+
+    def _predict_by_schedule(self, events: Events, schedule: MotionSchedule) -> None:
+        """Let the kernel apply each entry to the run of events that use it."""
+        from tiegocancel.kernels.predict import predict
+
+        first, last = (int(entry) for entry in schedule.entry_at(events.t[[0, -1]]))
+        inner = np.searchsorted(events.t, schedule.t_us[first + 1 : last + 1], side="left")
+        predict(
+            width=self.width,
+            height=self.height,
+            stride=self._stride,
+            origin=self._origin,
+            segments=np.concatenate([[0], inner, [len(events)]]).astype(np.int64),
+            coefficients=np.ascontiguousarray(schedule.coefficients[first : last + 1]),
+            x=events.x,
+            y=events.y,
+            ahead=self._ahead,
+        )
 
     def _move_base(self, now_us: int) -> int:
         """Count relative times from just before ``now_us`` on, drop every prediction that is dead; return the base.
