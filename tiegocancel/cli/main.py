@@ -20,7 +20,9 @@ OK, FAILED, USAGE, INTERRUPTED = 0, 1, 2, 130
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one verb and return the exit code: 0 ok, 1 failed, 2 usage or configuration, 130 interrupted."""
-    args = _parser().parse_args(_joined(sys.argv[1:] if argv is None else argv))
+    words = list(sys.argv[1:] if argv is None else argv)
+    args = _parser().parse_args(_joined(words))
+    args.command = ["tiegocancel", *words]
     logging.basicConfig(
         stream=sys.stderr, level=logging.DEBUG if args.verbose else logging.WARNING, format="%(name)s: %(message)s"
     )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -17,13 +16,14 @@ _MANIFEST = "manifest.json"
 
 
 class OutputFolder:
-    """Write into ``path`` what one run makes; ``inputs`` are recorded with their checksums as they were before.
+    """Write into ``path`` what one run makes.
 
-    ``keep_clear`` names files that the run will write and that must not be among its inputs.
+    ``inputs`` are recorded with their checksums as they were before, ``command`` as it was given; ``keep_clear`` names
+    files that the run will write and that must not be among its inputs.
     """
 
-    def __init__(self, path: Path, inputs: list[Path], *, keep_clear: list[str]) -> None:
-        self.path = path
+    def __init__(self, path: Path, inputs: list[Path], *, command: list[str], keep_clear: list[str]) -> None:
+        self.path, self._command = path, command
         self._inputs = inputs
         self._records: list[dict[str, Any]] = []
         self._written: list[str] = []
@@ -53,7 +53,7 @@ class OutputFolder:
         """Write ``manifest.json``: what was run, on what, with what result, into which files."""
         write_manifest(
             self.path / _MANIFEST,
-            command=["tiegocancel", *sys.argv[1:]],
+            command=self._command,
             settings=settings,
             inputs=self._records,
             outputs=sorted(self._written),

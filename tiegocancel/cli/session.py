@@ -32,7 +32,8 @@ class Session:
         self.args, self.settings, self.title = args, settings, title
         format = settings.output.residual
         self.residual = None if format == "none" else f"residual.{'raw' if format == 'evt2' else format}"
-        self.folder = OutputFolder(args.out, inputs, keep_clear=[] if self.residual is None else [self.residual])
+        clear = [] if self.residual is None else [self.residual]
+        self.folder = OutputFolder(args.out, inputs, command=args.command, keep_clear=clear)
 
     def run(
         self,

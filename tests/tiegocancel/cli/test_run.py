@@ -64,6 +64,7 @@ def test_run_writes_residual_report_figures_and_manifest(
     assert "$" not in re.sub(r"base64,[^\"]*", "", page)
     manifest = json.loads((out / "manifest.json").read_text(encoding="utf-8"))
     assert manifest["results"] == numbers
+    assert manifest["command"][:2] == ["tiegocancel", "run"]
     assert manifest["inputs"][0]["bytes"] == source.stat().st_size
     assert {"report.html", "residual.npz", "before_after.png", "controls.png"} <= set(manifest["outputs"])
 
