@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tiegocancel.cli.options import add_reading_options
+from tiegocancel.cli.progress import event_progress
 from tiegocancel.cli.settings import add_cancel_options, add_output_options, settings_from
 
 if TYPE_CHECKING:
@@ -44,10 +46,14 @@ def run(args: argparse.Namespace) -> int:
     from tiegocancel.files import open_events
     from tiegocancel.motion.source import trajectory_from
 
-    with open_events(args.source, **asdict(settings.read), format=args.format) as reader:
-        trajectory, fit = trajectory_from(
-            settings.motion.source, sample=lambda: _sample(reader), width=reader.width, height=reader.height
-        )
+    with open_events(args.source, **asdict(settings.read)) as reader:
+        with event_progress("finding the motion", None) as advance:
+            trajectory, fit = trajectory_from(
+                settings.motion.source,
+                sample=lambda: _sample(reader, advance),
+                width=reader.width,
+                height=reader.height,
+            )
         session = Session(args, settings, title=args.source.name, inputs=_inputs(args.source, settings.motion.source))
         return session.run(
             reader,
@@ -60,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
         )
 
 
-def _sample(reader: EventReader) -> Events:
+def _sample(reader: EventReader, advance: Callable[[Events], None]) -> Events:
     """Read the events that the fit may look at; a fault further on is left to the run itself."""
     from tiegocancel.errors import TiegoCancelError
     from tiegocancel.events import Events
@@ -70,6 +76,7 @@ def _sample(reader: EventReader) -> Events:
     try:
         for chunk in reader:
             parts.append(chunk)
+            advance(chunk)
             count += len(chunk)
             if count > SAMPLE_EVENTS:
                 break

@@ -33,6 +33,7 @@ _KEYS = {
     "height": ("read", "height"),
     "time_unit": ("read", "time_unit"),
     "columns": ("read", "columns"),
+    "format": ("read", "format"),
     "chunk_events": ("read", "chunk_events"),
     "keep_going": ("read", "keep_going"),
     "duration": ("simulate", "duration_s"),

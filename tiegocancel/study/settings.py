@@ -9,7 +9,14 @@ from tiegocancel.files.options import ReadOptions
 from tiegocancel.matching.config import CancelConfig
 from tiegocancel.scene.config import SceneConfig
 
-__all__ = ["MotionSettings", "OutputSettings", "ReportSettings", "Settings", "SimulateSettings"]
+__all__ = ["MotionSettings", "OutputSettings", "ReadSettings", "ReportSettings", "Settings", "SimulateSettings"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadSettings(ReadOptions):
+    """Add the ``format`` to what may be declared of a recording; ``None`` lets its header tell."""
+
+    format: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,7 +85,7 @@ class SimulateSettings:
 class Settings:
     """Every table of a configuration file, by name."""
 
-    read: ReadOptions = field(default_factory=ReadOptions)
+    read: ReadSettings = field(default_factory=ReadSettings)
     motion: MotionSettings = field(default_factory=MotionSettings)
     cancel: CancelConfig = field(default_factory=CancelConfig)
     report: ReportSettings = field(default_factory=ReportSettings)

@@ -15,7 +15,7 @@ SHOWS_NOTHING = 0.05
 FEWEST_EVENTS = 200
 MUCH_OVERFLOW = 0.05
 SELECTIVE = 0.2
-"""From this gap on, the motion explains most of the ratio."""
+"""From this gap on, no control comes close. A judgement, not a law: the gap itself always stands beside it."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -74,7 +74,7 @@ def test_flags_override_the_file_which_overrides_the_defaults(
 ) -> None:
     config = tmp_path / "run.toml"
     config.write_text(
-        f'[cancel]\nhorizon_us = 9000\ntolerance_px = 1.0\n[motion]\nsource = "{MOTION}"\n'
+        f'[read]\nformat = "npz"\n[cancel]\nhorizon_us = 9000\ntolerance_px = 1.0\n[motion]\nsource = "{MOTION}"\n'
         "[output]\nfigures = false\n[report]\ncontrols = false\n",
         encoding="utf-8",
     )
@@ -84,7 +84,11 @@ def test_flags_override_the_file_which_overrides_the_defaults(
     assert settings["cancel"] == {
         "horizon_us": 7000, "tolerance_us": 1000, "tolerance_px": 1.0, "polarity": "opposite", "ring_capacity": 65_536,
     }  # fmt: skip
+    assert settings["read"]["format"] == "npz"
     assert not list(out.glob("*.png"))
+    config.write_text('[read]\nformat = "evt3"\n', encoding="utf-8")
+    assert main(["run", str(source), "--config", str(config), "--motion", MOTION, "--out", str(out)]) == 1
+    assert "ring.npz" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

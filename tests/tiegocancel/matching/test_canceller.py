@@ -250,6 +250,7 @@ def test_rotation_cancels_a_rotating_ring_and_zero_motion_does_not() -> None:
         name: Canceller(config, motion, width=200, height=200).process(events).suppressed[late].mean()
         for name, motion in (("true", true), ("still", MotionSchedule.still()))
     }
+    # The pixel raster costs the rest: two markers' predictions can round into one cell, which holds one of them.
     assert share["true"] > 0.88
     assert share["still"] < 0.05
 
