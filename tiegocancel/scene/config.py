@@ -7,22 +7,24 @@ from dataclasses import dataclass, field
 
 from tiegocancel.events import MAX_SIDE_PX
 from tiegocancel.scene.check import check_number, check_whole
+from tiegocancel.scene.companion import CompanionConfig
 from tiegocancel.scene.layout import Layout
 from tiegocancel.scene.mover import MoverConfig
 from tiegocancel.scene.rig import RigConfig
 from tiegocancel.scene.sensor import SensorConfig
+from tiegocancel.scene.steps import BLOCK_SPAN_S, step_for
 
 __all__ = ["SceneConfig"]
 
-SHORTEST_STEP_US, LONGEST_STEP_US = 10, 1000
 STEPS_PER_FLICKER = 25
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class SceneConfig:
-    """Set sensor size, disc, mover, pixel model, light and time step.
+    """Set sensor size, disc, movers, pixel model, light and time step.
 
-    ``rig`` and ``mover`` are fitted to the sensor: lengths left open get their values here. ``step_px`` is the
+    ``mover`` passes before ``companion``, which is off unless it is enabled, and that before the disc of ``rig``. All
+    are fitted to the sensor: lengths left open get their values here. ``step_px`` is the
     farthest that anything moves between two samples of the intensity; ``flicker_depth`` the amplitude of the light's
     modulation at ``flicker_hz`` as a share of its mean (0: steady light). Raise ``ValueError`` for values out of range.
     """
@@ -31,6 +33,7 @@ class SceneConfig:
     height: int = 720
     rig: RigConfig = field(default_factory=RigConfig)
     mover: MoverConfig = field(default_factory=MoverConfig)
+    companion: CompanionConfig = field(default_factory=CompanionConfig)
     sensor: SensorConfig = field(default_factory=SensorConfig)
     flicker_depth: float = 0.0
     flicker_hz: float = 100.0
@@ -41,12 +44,14 @@ class SceneConfig:
             check_whole(self, name, 1, MAX_SIDE_PX)
         if self.width * self.height > 1 << 26:
             raise ValueError(f"the scene holds at most 2^26 pixels, not {self.width} × {self.height}")
-        for name, kind in (("rig", RigConfig), ("mover", MoverConfig), ("sensor", SensorConfig)):
+        kinds = {"rig": RigConfig, "mover": MoverConfig, "companion": CompanionConfig, "sensor": SensorConfig}
+        for name, kind in kinds.items():
             if not isinstance(getattr(self, name), kind):
                 raise TypeError(f"{name} must be a {kind.__name__}, not {type(getattr(self, name)).__name__}")
         layout = Layout(width=self.width, height=self.height)
         object.__setattr__(self, "rig", self.rig.fitted(layout))
         object.__setattr__(self, "mover", self.mover.fitted(layout))
+        object.__setattr__(self, "companion", self.companion.fitted(layout))
         check_number(self, "flicker_depth", 0.0, 0.95)
         check_number(self, "flicker_hz", 0.1, 4000.0)
         check_number(self, "step_px", 0.05, 2.0)
@@ -57,11 +62,14 @@ class SceneConfig:
         rig, hand = RigConfig(omega_rad_s=omega_rad_s), MoverConfig(enabled=mover)
         return cls(width=width, height=height, rig=rig, mover=hand)
 
-    @property
-    def step_us(self) -> int:
-        """Time between two samples of the intensity, short enough for ``step_px`` and for the flicker."""
-        speed_px_s = max(self.rig.rim_speed_px_s, self.mover.speed_px_s if self.mover.enabled else 0.0)
-        step_us = self.step_px * 1e6 / speed_px_s if speed_px_s > 0.0 else math.inf
-        if self.flicker_depth > 0.0:
-            step_us = min(step_us, 1e6 / (STEPS_PER_FLICKER * self.flicker_hz))
-        return int(min(max(step_us, SHORTEST_STEP_US), LONGEST_STEP_US))
+    def step_us(self, start_s: float = 0.0) -> int:
+        """Return the time between two samples in the block that begins at ``start_s``.
+
+        It is short enough for ``step_px`` at the fastest that the disc gets within the block, and for the flicker.
+        """
+        rim_px_s = self.rig.rim_speed_px_s(start_s, start_s + BLOCK_SPAN_S)
+        speed_px_s = max(rim_px_s, self.mover.speed_px_s if self.mover.enabled else 0.0)
+        if self.companion.enabled:
+            speed_px_s = max(speed_px_s, self.companion.speed_px_s(rim_px_s, self.rig.radius_px))
+        longest_us = 1e6 / (STEPS_PER_FLICKER * self.flicker_hz) if self.flicker_depth > 0.0 else math.inf
+        return step_for(self.step_px, speed_px_s, longest_us)

@@ -75,6 +75,9 @@ class MoverConfig:
         path = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
         return np.asarray(self.arc_center_px) + self.arc_radius_px * path
 
+    def angle_at(self, time_s: NDArray[np.float64]) -> None:
+        """Tell that the hand stays upright."""
+
 
 def draw_mover(config: MoverConfig) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Return log-intensity and cover of the hand float32[rows, columns], its middle in the middle of both.

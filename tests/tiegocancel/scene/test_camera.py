@@ -54,6 +54,28 @@ def test_a_longer_recording_begins_with_the_shorter_one():
         np.testing.assert_array_equal(columns(short), columns(long.between(0, round(duration_s * 1e6))))
 
 
+def test_a_longer_recording_of_a_ramp_begins_with_the_shorter_one():
+    ramped = small(rig=RigConfig(omega_rad_s=2.0, ramp_rad_s2=100.0))
+    long = recorded(ramped, 0.2, seed=1)
+    assert ramped.step_us(0.15) < ramped.step_us(0.05) < ramped.step_us(0.0)
+    for duration_s in (0.07, 0.131):
+        short = recorded(ramped, duration_s, seed=1)
+        np.testing.assert_array_equal(columns(short), columns(long.between(0, round(duration_s * 1e6))))
+
+
+def test_a_change_of_step_neither_loses_nor_repeats_events():
+    # The same light, once in coarse steps that change and once in fine ones that stay.
+    rig = RigConfig(omega_rad_s=2.0, ramp_rad_s2=100.0)
+    sensor = SensorConfig(jitter_us=0.0, noise_hz=0.0)
+    coarse, fine = (recorded(small(rig=rig, sensor=sensor, step_px=step_px), 0.2) for step_px in (0.5, 0.05))
+    assert len(coarse) == pytest.approx(len(fine), rel=0.02)
+    for events in (coarse, fine):
+        pixel = events.y.astype(int) * 320 + events.x
+        order = np.argsort(pixel, kind="stable")
+        gap = np.diff(events.t[order])[np.diff(pixel[order]) == 0]
+        assert gap.min() > sensor.refractory_us - 1.0
+
+
 def test_the_start_time_only_shifts_the_stamps():
     plain, shifted = recorded(small(), 0.02), recorded(small(), 0.02, start_us=-7_000_000)
     np.testing.assert_array_equal(plain.t - 7_000_000, shifted.t)
@@ -98,6 +120,15 @@ def test_a_mover_before_a_still_disc_makes_mover_events_only():
     events = recorded(small(rig=RigConfig(omega_rad_s=0.0), sensor=QUIET), 0.2)
     assert len(events) > 1000
     assert set(events.label.tolist()) == {MOVER}
+
+
+def test_a_hand_at_rest_before_a_turning_disc_causes_nothing_not_even_at_its_rim():
+    config = small(mover=MoverConfig(speed_px_s=0.0, phase_rad=1.0), sensor=QUIET)
+    events = recorded(config, 0.2)
+    assert set(events.label.tolist()) == {EGO}
+    # The hand does hide a part of the disc: the events are fewer than without it.
+    alone = recorded(small(mover=MoverConfig(enabled=False), sensor=QUIET), 0.2)
+    assert len(events) < 0.98 * len(alone)
 
 
 def test_mover_labels_end_with_the_pixels_that_it_reaches():

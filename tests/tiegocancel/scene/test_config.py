@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from tiegocancel.config import fill
 from tiegocancel.errors import ConfigError
@@ -65,6 +68,10 @@ def test_tables_fill_every_part():
         ({"width": 0}, "width must be an integer from 1 to 65536, not 0"),
         ({"width": 65536, "height": 65536}, "at most 2\\^26 pixels"),
         ({"flicker_depth": 1.0}, "flicker_depth must be"),
+        ({"rig": {"wobble_px": [-1.0, 2.0]}}, "wobble_px must be two numbers from 0 to 512, not"),
+        ({"rig": {"wobble_px": [float("nan"), float("nan")]}}, "wobble_px must be two numbers from 0 to 512, not"),
+        ({"rig": {"stop_share": 1.5}}, "stop_share must be a finite number of at least 0 and at most 1, not 1.5"),
+        ({"rig": {"stop_go_hz": 20.0, "stop_share": 0.5}}, "stop_share 0.5 of the period must fit into the 0.05 s"),
     ],
 )
 def test_values_out_of_range_are_one_line_with_key_and_value(table, message):
@@ -80,8 +87,44 @@ def test_parts_of_another_kind_are_refused():
 
 def test_faster_motion_and_flicker_shorten_the_step():
     still = SceneConfig(rig=RigConfig(omega_rad_s=0.0), mover=MoverConfig(enabled=False))
-    assert still.step_us == 1000
-    assert SceneConfig().step_us == pytest.approx(0.5e6 / (3.6 * 264.0), abs=1)
-    assert SceneConfig(rig=RigConfig(omega_rad_s=-36.0)).step_us == pytest.approx(0.5e5 / (3.6 * 264.0), abs=1)
-    assert SceneConfig(flicker_depth=0.2, flicker_hz=1000.0).step_us == 40
-    assert SceneConfig(rig=RigConfig(omega_rad_s=1e5)).step_us == 10
+    assert still.step_us() == 1000
+    assert SceneConfig().step_us() == pytest.approx(0.5e6 / (3.6 * 264.0), abs=1)
+    assert SceneConfig(rig=RigConfig(omega_rad_s=-36.0)).step_us() == pytest.approx(0.5e5 / (3.6 * 264.0), abs=1)
+    assert SceneConfig(flicker_depth=0.2, flicker_hz=1000.0).step_us() == 40
+    assert SceneConfig(rig=RigConfig(omega_rad_s=1e5)).step_us() == 10
+
+
+def test_the_step_follows_a_ramp_for_as_long_as_it_lasts():
+    ramped = SceneConfig(rig=RigConfig(omega_rad_s=3.6, ramp_rad_s2=2.0))
+    steps = [ramped.step_us(start_s) for start_s in (0.0, 1.0, 10.0, 40.0)]
+    np.testing.assert_allclose(steps, [0.5e6 / (264.0 * (3.65 + 2.0 * t)) for t in (0, 1, 10, 40)], rtol=0.06)
+    assert ramped.step_us(-5.0) == pytest.approx(0.5e6 / (264.0 * 6.4), rel=0.02)
+
+
+@given(
+    omega_rad_s=st.floats(-5.0, 5.0),
+    ripple=st.floats(0.0, 1.0),
+    ramp_rad_s2=st.floats(-5.0, 5.0),
+    wobble_px=st.tuples(st.floats(0.0, 30.0), st.floats(0.0, 30.0)),
+    stop_go_hz=st.sampled_from([0.0, 3.0]),
+    start_s=st.floats(0.0, 5.0),
+)
+def test_no_point_of_the_disc_is_faster_than_the_bound(
+    omega_rad_s, ripple, ramp_rad_s2, wobble_px, stop_go_hz, start_s
+):
+    rig = SceneConfig(
+        rig=RigConfig(
+            omega_rad_s=omega_rad_s,
+            ripple=ripple,
+            ramp_rad_s2=ramp_rad_s2,
+            wobble_px=wobble_px,
+            wobble_hz=3.0,
+            stop_go_hz=stop_go_hz,
+        )
+    ).rig
+    time_s = np.linspace(start_s, start_s + 0.3, 3001)
+    rim = np.linspace(0.0, math.tau, 8, endpoint=False)
+    angle = rig.angle_at(time_s)[:, None] + rim
+    points = rig.center_at(time_s)[:, None] + rig.radius_px * np.stack([np.cos(angle), np.sin(angle)], -1)
+    speed = np.hypot(*np.moveaxis(np.diff(points, axis=0), 2, 0)) / 1e-4
+    assert speed.max() <= rig.rim_speed_px_s(start_s, start_s + 0.3) * (1.0 + 1e-6) + 1e-6

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tiegocancel.scene import RigConfig, SceneConfig, photograph
+from tiegocancel.scene import MoverConfig, RigConfig, SceneConfig, photograph
 from tiegocancel.scene.mover import MOVER_SAMPLES_PX, draw_mover
 from tiegocancel.scene.paint import DISC_SAMPLES_PX, disc_cover, paint_board, paint_disc
 from tiegocancel.scene.patterns import contour_lines, scattered_shapes
@@ -107,6 +107,21 @@ def test_a_photograph_shows_the_disc_turned():
     shifted = replace(config, rig=replace(config.rig, center_px=(float(column), float(row))))
     first, turned = photograph(shifted), photograph(shifted, time_s=np.pi / 3.6)
     np.testing.assert_allclose(first[row + y, column + x], turned[row - y, column - x], atol=2e-3)
+
+
+@pytest.mark.parametrize("time_s", [0.0, 0.03, 0.11])
+def test_a_wobbling_disc_is_seen_whole_about_its_middle_of_the_moment(time_s):
+    still = SceneConfig(width=320, height=180, rig=RigConfig(omega_rad_s=2.0), mover=MoverConfig(enabled=False))
+    wobbling = replace(still, rig=replace(still.rig, wobble_px=(8.0, 5.0), wobble_hz=4.0))
+    middle = wobbling.rig.center_at(np.array([time_s]))[0]
+    there = replace(still, rig=replace(still.rig, center_px=(float(middle[0]), float(middle[1]))))
+    seen, expected = photograph(wobbling, time_s=time_s), photograph(there, time_s=time_s)
+    y, x = np.mgrid[:180, :320]
+    away = np.hypot(x - middle[0], y - middle[1])
+    inside, outside = away < still.rig.radius_px - 1.0, away > still.rig.radius_px + 1.0
+    np.testing.assert_allclose(seen[inside], expected[inside], atol=2e-3)
+    board = np.exp(paint_board(still.rig, 320, 180)).reshape(180, 320)
+    np.testing.assert_allclose(seen[outside], board[outside], atol=1e-5)
 
 
 def test_a_disc_without_blur_can_be_painted():

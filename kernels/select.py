@@ -1,0 +1,273 @@
+"""Run the selective canceller over a launch of events, in order: several horizons, carried support, bins and sets.
+
+The rule is that of ``tiegocancel/matching/semantics.md``; ``kernels.match`` is the same rule at its defaults, several
+times as fast. Times are whole ticks in 64 bits, so that nothing wraps here; a device's narrow stamps must not show.
+"""
+
+from functools import cache
+
+from tiegocancel.kernels.runtime import start, ti
+
+__all__ = ["COUNTS", "select"]
+
+COUNTS = ("events", "suppressed", "predicted", "outside", "overflow", "overwritten", "ring_high_water", "still")
+"""What ``counts`` holds, in this order."""
+
+
+def select(*, horizons, ways, at_gate, state):
+    """Run one launch; ``state`` holds the kernel's arguments by name, as :func:`_kernel` lists them.
+
+    ``horizons``: how many; ``ways``: cells of a set, 0 for a cell for every bin; ``at_gate``: predict with the motion
+    of the time when the gate opens.
+    """
+    start()
+    _kernel(horizons, ways, at_gate)(**state)
+
+
+@cache
+def _kernel(horizons, ways, at_gate):
+    @ti.func
+    def place(axis: ti.template(), rows: ti.template(), h: ti.i32, row: ti.i32, x: ti.i64, y: ti.i64) -> ti.i64:
+        along = x
+        if ti.static(axis == 1):
+            along = y
+        first = rows[h, row, 3 * axis] * x + rows[h, row, 3 * axis + 1] * y + rows[h, row, 3 * axis + 2]
+        return ((along << 16) + first + 32768) >> 16
+
+    @ti.func
+    def cell_for(
+        cell_bin: ti.template(),
+        cell_time: ti.template(),
+        cell_horizons: ti.template(),
+        bin: ti.i32,
+        bins_x: ti.i32,
+        set_columns: ti.i32,
+        set_rows: ti.i32,
+        now: ti.i64,
+        late: ti.i64,
+        write: ti.template(),
+    ) -> ti.i32:
+        found = bin
+        if ti.static(ways > 0):
+            column = bin % bins_x
+            row = bin // bins_x
+            base = ((row & ((1 << set_rows) - 1)) << set_columns | (column & ((1 << set_columns) - 1))) * ways
+            found = -1
+            free = -1
+            oldest = base
+            for w in range(ways):
+                at = base + w
+                is_open = cell_horizons[at] != 0 and now <= cell_time[at] + late
+                if is_open and cell_bin[at] == bin and found < 0:
+                    found = at
+                if not is_open and free < 0:
+                    free = at
+                if cell_time[at] < cell_time[oldest]:
+                    oldest = at
+            if ti.static(write):
+                if found < 0:
+                    found = free
+                if found < 0:
+                    found = oldest
+        return found
+
+    @ti.kernel
+    def run(
+        first: ti.i32,
+        last: ti.i32,
+        width: ti.i64,
+        height: ti.i64,
+        tick_bits: ti.i32,
+        horizon: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [horizons] ticks, rising
+        early: ti.i64,  # ticks
+        late: ti.i64,  # ticks
+        flip: ti.i32,  # 0 opposite, 1 equal
+        blur: ti.i32,  # 1 ignores polarity
+        bin_bits: ti.i32,
+        bins_x: ti.i32,
+        set_columns: ti.i32,
+        set_rows: ti.i32,
+        uses: ti.i32,
+        carry: ti.i32,
+        need: ti.i32,
+        least_squared: ti.i64,
+        offsets: ti.types.ndarray(dtype=ti.i32, ndim=2),  # [window, 2] dx dy, nearest first
+        row_t: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [rows] µs
+        rows: ti.types.ndarray(dtype=ti.i64, ndim=3),  # [horizons, rows, 6]
+        capacity: ti.i32,
+        t: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [n] µs
+        x: ti.types.ndarray(dtype=ti.u16, ndim=1),  # [n]
+        y: ti.types.ndarray(dtype=ti.u16, ndim=1),  # [n]
+        p: ti.types.ndarray(dtype=ti.u8, ndim=1),  # [n]
+        ring_t: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [capacity] µs
+        ring_x: ti.types.ndarray(dtype=ti.u16, ndim=1),  # [capacity]
+        ring_y: ti.types.ndarray(dtype=ti.u16, ndim=1),  # [capacity]
+        ring_p: ti.types.ndarray(dtype=ti.u8, ndim=1),  # [capacity] polarity | support << 1
+        ring_source: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [capacity]
+        pointers: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [1 + horizons] entries stored, entries passed by each
+        cell_bin: ti.types.ndarray(dtype=ti.i32, ndim=1),  # [cells]
+        cell_time: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [cells] ticks
+        cell_horizons: ti.types.ndarray(dtype=ti.u8, ndim=1),  # [cells] a bit for each, 0 is empty
+        cell_sign: ti.types.ndarray(dtype=ti.u8, ndim=1),  # [cells] polarity | support << 1
+        cell_uses: ti.types.ndarray(dtype=ti.u8, ndim=1),  # [cells]
+        cell_source: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [cells]
+        cell_last: ti.types.ndarray(dtype=ti.u8, ndim=1),  # [cells] the horizon that wrote last
+        counts: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [8], see COUNTS
+        suppressed: ti.types.ndarray(dtype=ti.u8, ndim=1),  # [n] out
+        source: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [n] out
+        used_horizon: ti.types.ndarray(dtype=ti.u8, ndim=1),  # [n] out
+    ):
+        ti.loop_config(serialize=True)
+        for _ in range(1):  # one serial task
+            row_of = ti.Vector.zero(ti.i32, 5)  # the row that each pointer's entry uses, then that of the event
+            many = row_t.shape[0]
+            for i in range(first, last):
+                at = t[i]
+                now = at >> tick_bits
+                column = ti.cast(x[i], ti.i64)
+                line = ti.cast(y[i], ti.i64)
+                sign = ti.cast(p[i], ti.i32)
+
+                # 1. drain
+                for h in ti.static(range(horizons)):
+                    going = True
+                    while going:
+                        going = False
+                        if pointers[1 + h] < pointers[0]:
+                            slot = ti.cast(pointers[1 + h] % capacity, ti.i32)
+                            due = (ring_t[slot] >> tick_bits) + horizon[h]
+                            if due - early <= now:
+                                going = True
+                                pointers[1 + h] += 1
+                                asked = ring_t[slot]
+                                if ti.static(at_gate):
+                                    asked += (horizon[h] - early) << tick_bits
+                                k = row_of[h]
+                                while k + 1 < many and row_t[k + 1] <= asked:
+                                    k += 1
+                                row_of[h] = k
+                                from_x = ti.cast(ring_x[slot], ti.i64)
+                                from_y = ti.cast(ring_y[slot], ti.i64)
+                                to_x = place(0, rows, h, k, from_x, from_y)
+                                to_y = place(1, rows, h, k, from_x, from_y)
+                                inside = to_x >= 0 and to_x < width and to_y >= 0 and to_y < height
+                                moved = ti.i64(0)
+                                if inside:
+                                    moved = (to_x - from_x) * (to_x - from_x) + (to_y - from_y) * (to_y - from_y)
+                                if inside and moved >= least_squared and due + late >= now:
+                                    bin = ti.cast((to_y >> bin_bits) * bins_x + (to_x >> bin_bits), ti.i32)
+                                    cell = cell_for(
+                                        cell_bin, cell_time, cell_horizons, bin, bins_x, set_columns, set_rows,
+                                        now, late, True,
+                                    )  # fmt: skip
+                                    is_open = cell_horizons[cell] != 0 and now <= cell_time[cell] + late
+                                    its_sign = ti.cast(ring_p[slot] & 1, ti.i32)
+                                    support = ti.cast(ring_p[slot] >> 1, ti.i32)
+                                    old_sign = ti.cast(cell_sign[cell] & 1, ti.i32)
+                                    if is_open and cell_bin[cell] == bin and old_sign == its_sign:
+                                        held = ti.cast(cell_horizons[cell], ti.i32)
+                                        if (held >> h) & 1 == 0:
+                                            cell_horizons[cell] = ti.cast(held | (1 << h), ti.u8)
+                                        elif uses > 0:
+                                            if ti.cast(cell_uses[cell], ti.i32) == uses:
+                                                counts[5] += 1
+                                            else:
+                                                cell_uses[cell] += ti.u8(1)
+                                        support = ti.max(support, ti.cast(cell_sign[cell] >> 1, ti.i32))
+                                    else:
+                                        if is_open:
+                                            counts[5] += 1
+                                        cell_bin[cell] = bin
+                                        cell_horizons[cell] = ti.cast(1 << h, ti.u8)
+                                        cell_uses[cell] = ti.u8(1)
+                                    cell_sign[cell] = ti.cast(its_sign | (support << 1), ti.u8)
+                                    cell_time[cell] = due
+                                    cell_source[cell] = ring_source[slot]
+                                    cell_last[cell] = ti.u8(h)
+
+                # 2. match
+                nearest = -1
+                votes = 0
+                carried = 0
+                searching = True
+                for o in range(offsets.shape[0]):
+                    beside_x = ti.cast(column, ti.i32) + offsets[o, 0]
+                    beside_y = ti.cast(line, ti.i32) + offsets[o, 1]
+                    if searching and beside_x >= 0 and beside_y >= 0 and beside_x < width and beside_y < height:
+                        bin = (beside_y >> bin_bits) * bins_x + (beside_x >> bin_bits)
+                        fresh = True
+                        if bin_bits > 0:
+                            # Each bin once: the first offset that falls into it.
+                            for q in range(o):
+                                other_x = ti.cast(column, ti.i32) + offsets[q, 0]
+                                other_y = ti.cast(line, ti.i32) + offsets[q, 1]
+                                there = other_x >= 0 and other_y >= 0 and other_x < width and other_y < height
+                                if there and (other_y >> bin_bits) * bins_x + (other_x >> bin_bits) == bin:
+                                    fresh = False
+                        if fresh:
+                            cell = cell_for(
+                                cell_bin, cell_time, cell_horizons, bin, bins_x, set_columns, set_rows,
+                                now, late, False,
+                            )  # fmt: skip
+                            if cell >= 0:
+                                held = ti.cast(cell_horizons[cell], ti.i32)
+                                passes = blur == 1 or ti.cast(cell_sign[cell] & 1, ti.i32) == (sign ^ flip)
+                                timely = now <= cell_time[cell] + late and now >= cell_time[cell] - early
+                                if held != 0 and timely and passes:
+                                    if nearest < 0:
+                                        nearest = cell
+                                    votes |= held
+                                    carried = ti.max(carried, ti.cast(cell_sign[cell] >> 1, ti.i32))
+                                    searching = not (need == 1 and carry == 0)
+                support = 0
+                if nearest >= 0:
+                    support = carried + (votes & 1) + ((votes >> 1) & 1) + ((votes >> 2) & 1) + ((votes >> 3) & 1)
+                hit = nearest >= 0 and support >= need
+                suppressed[i] = ti.cast(hit, ti.u8)
+                source[i] = ti.i64(-1)
+                if hit:
+                    counts[1] += 1
+                    source[i] = cell_source[nearest]
+                    used_horizon[i] = cell_last[nearest]
+                    if uses > 0:
+                        if cell_uses[nearest] > 1:
+                            cell_uses[nearest] -= ti.u8(1)
+                        else:
+                            cell_horizons[nearest] = ti.u8(0)
+
+                # 3. remember
+                made = ti.static(1 if at_gate else 0) + 0 * sign
+                beyond = False
+                if ti.static(not at_gate):
+                    k = row_of[4]
+                    while k + 1 < many and row_t[k + 1] <= at:
+                        k += 1
+                    row_of[4] = k
+                    for h in ti.static(range(horizons)):
+                        to_x = place(0, rows, h, k, column, line)
+                        to_y = place(1, rows, h, k, column, line)
+                        if to_x >= 0 and to_x < width and to_y >= 0 and to_y < height:
+                            if (to_x - column) * (to_x - column) + (to_y - line) * (to_y - line) >= least_squared:
+                                made = 1
+                        else:
+                            beyond = True
+                if made == 0:
+                    if beyond:
+                        counts[3] += 1
+                    else:
+                        counts[7] += 1
+                elif pointers[0] - pointers[horizons] == capacity:
+                    counts[4] += 1
+                else:
+                    slot = ti.cast(pointers[0] % capacity, ti.i32)
+                    ring_t[slot] = at
+                    ring_x[slot] = x[i]
+                    ring_y[slot] = y[i]
+                    ring_p[slot] = ti.cast(sign | (ti.min(support, carry) << 1), ti.u8)
+                    ring_source[slot] = counts[0]
+                    pointers[0] += 1
+                    counts[2] += 1
+                    counts[6] = ti.max(counts[6], pointers[0] - pointers[horizons])
+                counts[0] += 1
+
+    return run
