@@ -50,14 +50,16 @@ def open_events(
     columns: str | None = None,
     chunk_events: int = 1 << 20,
     keep_going: bool = False,
+    undistort: str | PathLike[str] | None = None,
     format: str | None = None,
 ) -> EventReader:
     """Open a recording for reading in chunks; the format is told by its header, or declared.
 
     ``width`` and ``height`` in px, ``time_unit`` (s, ms, us, ns) and ``columns`` (letters t x y p, ``-`` skips one)
     declare what the file does not say. With ``keep_going`` a fault ends the stream with a note instead of an
-    error. Raise :class:`InputError` for what is wrong with the file, :class:`ConfigError` for a declaration that
-    cannot be meant, :class:`MissingExtraError` where the format needs the ``files`` extra.
+    error. ``undistort`` names a calibration (see :mod:`tiegocancel.motion.calibration_file`): events then lie where a
+    pinhole would show them. Raise :class:`InputError` for what is wrong with a file, :class:`ConfigError` for a
+    declaration that cannot be meant, :class:`MissingExtraError` where a format needs an extra.
     """
     options = ReadOptions(
         width=width,
@@ -66,11 +68,18 @@ def open_events(
         columns=columns,
         chunk_events=chunk_events,
         keep_going=keep_going,
+        undistort=None if undistort is None else str(undistort),
     )
     file = Path(path)
     name = _known("format", "text" if format == "csv" else format, tuple(_READERS)) if format else sniff(file)
     opener: Callable[[Path, ReadOptions], EventReader] = _load(_READERS[name])
-    return opener(file, options)
+    if options.undistort is None:
+        return opener(file, options)
+    from tiegocancel.files.undistort import undistorted
+    from tiegocancel.motion.calibration_file import read_calibration
+
+    intrinsics = read_calibration(options.undistort)
+    return undistorted(opener(file, options), intrinsics, source=Path(options.undistort).name)
 
 
 def read_events(
@@ -82,6 +91,7 @@ def read_events(
     columns: str | None = None,
     chunk_events: int = 1 << 20,
     keep_going: bool = False,
+    undistort: str | PathLike[str] | None = None,
     format: str | None = None,
 ) -> Events:
     """Read a whole recording, as :func:`open_events` does; an unsorted one is stably sorted by time."""
@@ -93,6 +103,7 @@ def read_events(
         columns=columns,
         chunk_events=chunk_events,
         keep_going=keep_going,
+        undistort=undistort,
         format=format,
     ) as reader:
         return reader.read()

@@ -18,7 +18,8 @@ class ReadOptions:
 
     ``width`` and ``height`` in px; ``time_unit`` one of s, ms, us, ns; ``columns`` the order of plain columns, as
     letters t x y p with ``-`` for a column to skip; ``chunk_events`` rows a chunk; ``keep_going`` keeps what was
-    decoded before a fault. Raise :class:`ConfigError` for a value that cannot be meant.
+    decoded before a fault; ``undistort`` the file of a calibration whose lens is undone. Raise :class:`ConfigError` for
+    a value that cannot be meant.
     """
 
     width: int | None = None
@@ -27,6 +28,7 @@ class ReadOptions:
     columns: str | None = None
     chunk_events: int = 1 << 20
     keep_going: bool = False
+    undistort: str | None = None
 
     def __post_init__(self) -> None:
         for name in ("width", "height"):

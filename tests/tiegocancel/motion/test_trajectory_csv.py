@@ -11,7 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tiegocancel.errors import InputError
-from tiegocancel.motion.trajectory import MAX_CENTER_PX, MAX_OMEGA_RAD_S, RotationTrajectory
+from tiegocancel.motion.affine import AffineTrajectory
+from tiegocancel.motion.rotation import MAX_CENTER_PX, MAX_OMEGA_RAD_S, RotationTrajectory
+from tiegocancel.motion.trajectory_csv import read_motion
 
 HEADER = "timestamp,center_x,center_y,omega_rad_s\n"
 
@@ -44,6 +46,89 @@ def test_round_trip_keeps_every_bit(tmp_path_factory, times, center, omega):
     assert np.array_equal(after.center_px, before.center_px)
     assert np.array_equal(after.omega_rad_s, before.omega_rad_s)
     assert after.source == "motion.csv"
+
+
+@given(
+    times=st.lists(st.integers(0, 1 << 30), min_size=1, max_size=12, unique=True).map(sorted),
+    seed=st.integers(0, 1 << 31),
+)
+def test_causal_round_trip_keeps_every_row_however_close(tmp_path_factory, times, seed):
+    rng = np.random.default_rng(seed)
+    before = RotationTrajectory(
+        t_us=np.array(times, np.int64),
+        center_px=rng.normal(size=(len(times), 2)),
+        omega_rad_s=rng.normal(size=len(times)),
+        omega_dot_rad_s2=rng.normal(size=len(times)),
+        interpolation="causal",
+    )
+    target = tmp_path_factory.mktemp("csv") / "causal.csv"
+    before.to_csv(target)
+    after = RotationTrajectory.from_csv(target)
+    for name in ("t_us", "center_px", "omega_rad_s", "omega_dot_rad_s2"):
+        assert np.array_equal(getattr(after, name), getattr(before, name))
+    assert after.interpolation == "causal"
+    assert any(note.startswith("causal") for note in after.notes)
+
+
+@pytest.mark.parametrize("interpolation", ["linear", "causal"])
+def test_affine_round_trip_keeps_every_bit(tmp_path, interpolation):
+    rng = np.random.default_rng(0)
+    before = AffineTrajectory(
+        t_us=np.arange(50) * 777 - 9,
+        rates=rng.normal(size=(50, 6)),
+        rates_dot=rng.normal(size=(50, 6)) if interpolation == "causal" else None,
+        interpolation=interpolation,
+    )
+    before.to_csv(tmp_path / "affine.csv")
+    for after in (AffineTrajectory.from_csv(tmp_path / "affine.csv"), read_motion(tmp_path / "affine.csv")):
+        assert isinstance(after, AffineTrajectory)
+        assert np.array_equal(after.t_us, before.t_us)
+        assert np.array_equal(after.rates, before.rates)
+        assert np.array_equal(after.rates_dot, before.rates_dot)
+        assert (after.interpolation, after.source) == (interpolation, "affine.csv")
+
+
+def test_the_header_tells_a_rotation_from_an_affine_motion(write):
+    assert isinstance(read_motion(write(HEADER + "0,1,2,3\n")), RotationTrajectory)
+    affine = read_motion(write("rate_f,note,t_us,rate_a,rate_b,rate_c,rate_d,rate_e\n6,x,7,1,2,3,4,5\n"))
+    assert isinstance(affine, AffineTrajectory)
+    assert (affine.t_us.tolist(), affine.rates.tolist()) == ([7], [[1, 2, 3, 4, 5, 6]])
+
+
+@pytest.mark.parametrize(
+    ("text", "where", "problem"),
+    [
+        ("timestamp,rate_a\n0,1\n", "header", "lacks the column rate_b"),
+        ("rate_a,rate_b,rate_c,rate_d,rate_e,rate_f\n1,2,3,4,5,6\n", "header", "lacks a time column"),
+        ("t,rate_a,rate_b,rate_c,rate_d,rate_e,rate_f\n0,1,2,x,4,5,6\n", "row 2, column rate_c", "found 'x'"),
+        ("t,rate_a,rate_b,rate_c,rate_d,rate_e,rate_f\n0,1,2e7,3,4,5,6\n", "row 2, column rate_b", "within ±1e+06"),
+        ("t,rate_a,rate_b,rate_c,rate_d,rate_e,rate_f,rate_dot_a\n0,1,2,3,4,5,6,7\n", "header", "rate_dot_b"),
+        ("t,rate_a,rate_b,rate_c,rate_d,rate_e,rate_f\n", "", "no rows"),
+    ],
+)
+def test_faults_of_an_affine_file_name_their_place(write, text, where, problem):
+    with pytest.raises(InputError) as caught:
+        read_motion(write(text))
+    assert caught.value.where == where
+    assert problem in str(caught.value)
+
+
+def test_rows_without_a_centre_are_skipped_and_counted(write):
+    trajectory = RotationTrajectory.from_csv(write(HEADER + "1,,,10\n2,1,1,20\n3,1, ,30\n4,2,2,40\n"))
+    assert trajectory.omega_rad_s.tolist() == [20, 40]
+    assert "2 of 4 rows have no centre and were skipped" in trajectory.notes
+    with pytest.raises(InputError, match="knows a centre in none of 1 rows"):
+        RotationTrajectory.from_csv(write(HEADER + "1,,,10\n"))
+
+
+def test_columns_of_an_estimator_are_understood_and_its_doubts_counted(write):
+    text = (
+        "timestamp,center_x,center_y,omega,omega_dot_rad_s2,center_sigma_px,omega_sigma_rad_s,sharpness,confident,"
+        "events_used,doubt\n0.1,1,2,3,4,inf,inf,,0,9,few events\n0.1005,5,6,7,8,1,1,2.0,1,9,\n"
+    )
+    trajectory = RotationTrajectory.from_csv(write(text))
+    assert (trajectory.omega_rad_s.tolist(), trajectory.omega_dot_rad_s2.tolist()) == ([3, 7], [4, 8])
+    assert "1 of 2 rows are marked doubtful" in trajectory.notes
 
 
 def test_dense_regular_rows_come_back_one_by_one(tmp_path):
