@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from tiegocancel.events import Events
 from tiegocancel.matching.config import CancelConfig
+from tiegocancel.matching.selective import Schedules, SelectiveEngine, schedules_for
 from tiegocancel.motion.schedule import MotionSchedule
-from tiegocancel.motion.trajectory import RotationTrajectory
+from tiegocancel.motion.trajectory import Trajectory
 
 __all__ = ["Canceller", "Counters", "Decisions"]
 
@@ -26,7 +27,8 @@ class Counters:
     ``events`` decided; ``suppressed`` of them; ``predicted``: predictions that entered the ring; ``outside``: discarded
     beyond the sensor; ``overflow``: discarded because the ring was full; ``overwritten``: replaced in their cell while
     their gate was still open; ``ring_high_water``: most predictions ever pending.
-    ``events = predicted + outside + overflow`` always holds.
+    ``still``: not made because they would move too little. ``events = predicted + outside + overflow + still`` always
+    holds.
     """
 
     events: int = 0
@@ -36,6 +38,7 @@ class Counters:
     overflow: int = 0
     overwritten: int = 0
     ring_high_water: int = 0
+    still: int = 0
 
     def keys(self) -> Iterator[str]:
         """Name the counts, so that ``dict(counters)`` works."""
@@ -51,17 +54,21 @@ class Counters:
 class Decisions:
     """Decide a chunk: ``suppressed`` bool[n]; ``source`` int64[n] or ``None`` when it is not tracked.
 
-    ``source`` is the index in the whole stream of the event whose prediction was used, −1 where there is none.
+    ``source`` is the index in the whole stream of the event whose prediction was used, −1 where there is none;
+    ``horizon`` uint8[n] which of several horizons that prediction was made for, ``None`` with one.
     """
 
     suppressed: NDArray[np.bool_]
     source: NDArray[np.int64] | None = None
+    horizon: NDArray[np.uint8] | None = None
 
 
 class Canceller:
     """Suppress the events that meet a prediction, exactly as ``semantics.md`` says.
 
-    ``motion`` is a :class:`MotionSchedule` (integer path) or a :class:`RotationTrajectory` (float path, for studies).
+    ``motion`` is a :class:`MotionSchedule` (integer path), one for each horizon where there are several, or a
+    trajectory (float path, for studies, and the plain rule alone); it may be replaced between chunks, as an online
+    estimator does.
     State is constant: 8 bytes for each of ``ring_capacity`` predictions and 4 bytes a pixel (16 and 12 with
     ``track_source``). Chunk borders and thread counts change nothing. Not thread-safe: one thread owns the kernels.
     """
@@ -69,15 +76,21 @@ class Canceller:
     def __init__(
         self,
         config: CancelConfig,
-        motion: MotionSchedule | RotationTrajectory,
+        motion: MotionSchedule | Schedules | Trajectory,
         *,
         width: int,
         height: int,
         track_source: bool = True,
     ) -> None:
         frame = Events.empty(width, height)  # the one place that knows which sensor sizes are valid
-        self.config, self.motion = config, motion
+        self.config = config
+        self.motion = motion
+        self._engine: SelectiveEngine | None = None
         self.width, self.height, self.track_source = frame.width, frame.height, track_source
+        self._last_us: int | None = None
+        if not config.is_plain:
+            self._engine = SelectiveEngine(config, width=self.width, height=self.height)
+            return
         border = max(abs(dx) for dx, _ in config.offsets)
         self._stride = self.width + border
         self._origin = border * self._stride + border
@@ -89,7 +102,6 @@ class Canceller:
         self._ring = np.zeros(config.ring_capacity, np.uint64)
         self._cursors = np.zeros(9, np.int64)
         self._base_us: int | None = None
-        self._last_us: int | None = None
         self._ahead = np.zeros(1, np.int32)  # where a chunk's predictions go; kept, for it costs time to map
         self._arguments: dict[str, Any] = {
             "horizon_us": config.horizon_us,
@@ -106,20 +118,37 @@ class Canceller:
         }
 
     @property
+    def motion(self) -> MotionSchedule | Schedules | Trajectory:
+        """The motion that the next chunk is decided with; a schedule must have been made for its horizon."""
+        return self._motion
+
+    @motion.setter
+    def motion(self, motion: MotionSchedule | Schedules | Trajectory) -> None:
+        if isinstance(motion, MotionSchedule | tuple):
+            schedules_for(self.config, motion)
+        elif not self.config.is_plain:
+            raise ValueError(
+                "a selective canceller runs schedules; a trajectory (the float path) serves the plain rule"
+            )
+        self._motion = motion
+
+    @property
     def counters(self) -> Counters:
         """Return the counts so far."""
-        return Counters(
-            **dict(zip((field.name for field in fields(Counters)), self._cursors[2:].tolist(), strict=True))
-        )
+        counts = [*self._cursors[2:].tolist(), 0] if self._engine is None else self._engine.counts.tolist()
+        return Counters(**dict(zip((field.name for field in fields(Counters)), counts, strict=True)))
 
     @property
     def pending(self) -> int:
         """Number of predictions in the ring."""
-        return int(self._cursors[1])
+        return int(self._cursors[1]) if self._engine is None else self._engine.pending
 
     def prepare(self) -> None:
         """Compile the kernel now instead of at the first event; it decides nothing."""
         one = Events([0], [0], [0], [0], self.width, self.height)  # type: ignore[arg-type]
+        if self._engine is not None:
+            self._engine.run(one[:0], self._schedules())
+            return
         self._predict(one)
         self._launch(one, 0, 0, np.zeros(1, np.uint8), np.zeros(1, np.int64), base_us=0)
 
@@ -133,6 +162,8 @@ class Canceller:
                 f"events of {events.width}×{events.height} px do not fit a canceller of {self.width}×{self.height} px"
             )
         count = len(events)
+        if self._engine is not None:
+            return self._select(events)
         suppressed = np.empty(count, np.uint8)
         source = np.empty(count if self.track_source else 1, np.int64)
         if count:
@@ -142,6 +173,24 @@ class Canceller:
                 self._launch(events, first, last, suppressed, source, base_us=base_us)
                 self._last_us = int(events.t[last - 1])
         return Decisions(suppressed=suppressed.view(np.bool_), source=source if self.track_source else None)
+
+    def _select(self, events: Events) -> Decisions:
+        """Decide a chunk by the selective rule."""
+        assert self._engine is not None
+        if len(events):
+            self._check_order(events)
+            self._last_us = int(events.t[-1])
+        suppressed, source, horizon = self._engine.run(events, self._schedules())
+        return Decisions(
+            suppressed=suppressed.view(np.bool_),
+            source=source if self.track_source else None,
+            horizon=horizon if self.track_source else None,
+        )
+
+    def _schedules(self) -> Schedules:
+        """Return the motion, a schedule for each horizon."""
+        assert isinstance(self._motion, MotionSchedule | tuple)
+        return schedules_for(self.config, self._motion)
 
     def _check_order(self, events: Events) -> None:
         """Refuse a chunk from before the last one: times never decrease in a stream."""
@@ -199,8 +248,8 @@ class Canceller:
         """Fill ``_ahead`` with the cell of each event's prediction, −1 beyond the sensor."""
         if len(self._ahead) < len(events):
             self._ahead = np.empty(len(events), np.int32)
-        if isinstance(self.motion, MotionSchedule):
-            self._predict_by_schedule(events, self.motion)
+        if isinstance(self.motion, MotionSchedule | tuple):
+            self._predict_by_schedule(events, self._schedules()[0])
             return
         ahead_x, ahead_y = self.motion.predict(events.t, events.x, events.y, self.config.horizon_us)
         inside = (ahead_x >= 0) & (ahead_x < self.width) & (ahead_y >= 0) & (ahead_y < self.height)

@@ -1,4 +1,4 @@
-"""State the rule plainly, one event at a time: the model that every implementation must equal bit for bit."""
+"""State the plain rule, one event at a time: the model that every implementation must equal bit for bit."""
 
 from __future__ import annotations
 
@@ -8,10 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from tiegocancel.events import Events
+from tiegocancel.matching.ahead import ahead
 from tiegocancel.matching.canceller import Counters, Decisions
 from tiegocancel.matching.config import CancelConfig
+from tiegocancel.matching.selective import Schedules
+from tiegocancel.matching.selective_oracle import SelectiveOracle
 from tiegocancel.motion.schedule import MotionSchedule
-from tiegocancel.motion.trajectory import RotationTrajectory
+from tiegocancel.motion.trajectory import Trajectory
 
 __all__ = ["OracleCanceller"]
 
@@ -28,12 +31,16 @@ class _Prediction:
 
 
 class OracleCanceller:
-    """Decide as ``semantics.md`` says, in plain Python: slow, readable, with the interface of ``Canceller``."""
+    """Decide as ``semantics.md`` says, in plain Python: slow, readable, with the interface of ``Canceller``.
+
+    Every configuration is served; what goes beyond the plain rule is :class:`SelectiveOracle`'s.
+    """
 
     def __init__(
-        self, config: CancelConfig, motion: MotionSchedule | RotationTrajectory, *, width: int, height: int
+        self, config: CancelConfig, motion: MotionSchedule | Schedules | Trajectory, *, width: int, height: int
     ) -> None:
         self.config, self.motion, self.width, self.height = config, motion, width, height
+        self._selective = None if config.is_plain else SelectiveOracle(config, motion, width=width, height=height)
         self._ring: deque[_Prediction] = deque()
         self._table: dict[tuple[int, int], _Prediction] = {}
         self._counts = dict(Counters())
@@ -41,15 +48,18 @@ class OracleCanceller:
     @property
     def counters(self) -> Counters:
         """Return the counts so far."""
-        return Counters(**self._counts)
+        return Counters(**self._counts) if self._selective is None else self._selective.counters
 
     @property
     def pending(self) -> int:
         """Number of predictions in the ring."""
-        return len(self._ring)
+        return len(self._ring) if self._selective is None else self._selective.pending
 
     def process(self, events: Events) -> Decisions:
         """Decide every event of a chunk; chunks may be cut anywhere."""
+        if self._selective is not None:
+            self._selective.motion = self.motion
+            return self._selective.process(events)
         suppressed = np.zeros(len(events), np.bool_)
         source = np.full(len(events), -1, np.int64)
         for i in range(len(events)):
@@ -87,7 +97,8 @@ class OracleCanceller:
 
     def _predict(self, t: int, x: int, y: int, p: int, index: int) -> None:
         """Expect the same edge one horizon later, unless it leaves the sensor or the ring is full."""
-        ahead_x, ahead_y = self._ahead(t, x, y)
+        motion = self.motion[0] if isinstance(self.motion, tuple) else self.motion
+        ahead_x, ahead_y = ahead(motion, t, x, y, self.config.horizon_us)
         if not (0 <= ahead_x < self.width and 0 <= ahead_y < self.height):
             self._counts["outside"] += 1
         elif len(self._ring) == self.config.ring_capacity:
@@ -96,19 +107,3 @@ class OracleCanceller:
             self._ring.append(_Prediction(t + self.config.horizon_us, ahead_x, ahead_y, p, index))
             self._counts["predicted"] += 1
             self._counts["ring_high_water"] = max(self._counts["ring_high_water"], len(self._ring))
-
-    def _ahead(self, t: int, x: int, y: int) -> tuple[int, int]:
-        """Apply the motion: six integers with 16 fractional bits, or the float path of a trajectory."""
-        if isinstance(self.motion, RotationTrajectory):
-            ahead_x, ahead_y = self.motion.predict(
-                np.array([t], np.int64), np.array([x], np.uint16), np.array([y], np.uint16), self.config.horizon_us
-            )
-            return int(ahead_x[0]), int(ahead_y[0])
-        entry = 0
-        while entry + 1 < len(self.motion) and self.motion.t_us[entry + 1] <= t:
-            entry += 1
-        a, b, c, d, e, f = (int(value) for value in self.motion.coefficients[entry])
-        return (
-            ((x << 16) + a * x + b * y + c + 32768) >> 16,
-            ((y << 16) + d * x + e * y + f + 32768) >> 16,
-        )

@@ -4,6 +4,7 @@ from tiegocancel.metrics.displacement import DisplacementHistogram
 from tiegocancel.metrics.ledger import Ledger, Matches, Settled
 from tiegocancel.metrics.rate import RateProfile
 from tiegocancel.metrics.regions import DiscRegion, estimate_radius_px
+from tiegocancel.metrics.residual_profile import ResidualProfile
 from tiegocancel.metrics.tally import Share, Tally
 
 __all__ = [
@@ -12,6 +13,7 @@ __all__ = [
     "Ledger",
     "Matches",
     "RateProfile",
+    "ResidualProfile",
     "Settled",
     "Share",
     "Tally",

@@ -24,11 +24,14 @@ class DisplacementHistogram:
 
     def __init__(self, config: CancelConfig, counted_from_us: int) -> None:
         self.counted_from_us = counted_from_us
-        self.reach_px = math.isqrt(config.reach_squared_px)
+        # A bin that is wider than a pixel may hold a prediction as far from the one that was looked at.
+        self.reach_px = math.isqrt(config.reach_squared_px) + (1 << config.bin_bits) - 1
         self.side = 2 * self.reach_px + 1
         self.by_offset: NDArray[np.int64] = np.zeros((self.side, self.side), np.int64)
-        gate = max(config.tolerance_us, 1)
-        self.lateness_edges_us: NDArray[np.float64] = np.linspace(-gate - 0.5, gate + 0.5, TIME_BINS + 1)
+        early, late = (
+            max(gate, 1) + (1 << config.tick_bits) - 1 for gate in (config.early_gate_us, config.late_gate_us)
+        )
+        self.lateness_edges_us: NDArray[np.float64] = np.linspace(-early - 0.5, late + 0.5, TIME_BINS + 1)
         self._late_sum_us = 0
         self.by_lateness: NDArray[np.int64] = np.zeros(TIME_BINS, np.int64)
 

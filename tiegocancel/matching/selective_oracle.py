@@ -1,0 +1,219 @@
+"""State the whole rule plainly, one event at a time: several horizons, carried support, shared and latched cells."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from tiegocancel.events import Events
+from tiegocancel.matching.ahead import ahead
+from tiegocancel.matching.canceller import Counters, Decisions
+from tiegocancel.matching.config import CancelConfig
+from tiegocancel.matching.selective import Schedules, schedules_for
+from tiegocancel.motion.schedule import MotionSchedule
+from tiegocancel.motion.trajectory import Trajectory
+
+__all__ = ["SelectiveOracle"]
+
+Bin = tuple[int, int]
+
+
+@dataclass(slots=True, frozen=True)
+class _Entry:
+    """Remember event ``index`` until its prediction for the longest horizon has fallen due."""
+
+    t_us: int
+    x: int
+    y: int
+    p: int
+    support: int
+    index: int
+
+
+@dataclass(slots=True)
+class _Cell:
+    """Expect events of polarity ``p`` in ``bin`` at tick ``due``, as ``horizons`` say; no horizons, no cell."""
+
+    bin: Bin = (0, 0)
+    due: int = 0
+    p: int = 0
+    horizons: set[int] = field(default_factory=set)
+    uses: int = 0
+    support: int = 0
+    source: int = -1
+    last: int = 0
+
+
+class SelectiveOracle:
+    """Decide as ``semantics.md`` says for every configuration, the plain rule included: slow, readable.
+
+    ``motion`` is a schedule, one for each horizon, or a trajectory (float path); it may be replaced between chunks.
+    """
+
+    def __init__(
+        self, config: CancelConfig, motion: MotionSchedule | Schedules | Trajectory, *, width: int, height: int
+    ) -> None:
+        self.config, self.motion, self.width, self.height = config, motion, width, height
+        self._horizons = [horizon >> config.tick_bits for horizon in config.horizons_us]
+        self._early = config.early_gate_us >> config.tick_bits
+        self._late = config.late_gate_us >> config.tick_bits
+        self._ring: dict[int, _Entry] = {}  # by the number under which it was stored
+        self._stored = 0
+        self._passed = [0] * len(self._horizons)
+        self._table: dict[Bin, list[_Cell]] = {}  # the ways of each set; without sets, one way for each bin
+        self._counts = dict(Counters())
+
+    @property
+    def counters(self) -> Counters:
+        """Return the counts so far."""
+        return Counters(**self._counts)
+
+    @property
+    def pending(self) -> int:
+        """Number of entries in the ring."""
+        return len(self._ring)
+
+    def process(self, events: Events) -> Decisions:
+        """Decide every event of a chunk; chunks may be cut anywhere."""
+        maps = self._maps()
+        suppressed = np.zeros(len(events), np.bool_)
+        source = np.full(len(events), -1, np.int64)
+        horizon = np.zeros(len(events), np.uint8)
+        for i in range(len(events)):
+            t, x, y, p = int(events.t[i]), int(events.x[i]), int(events.y[i]), int(events.p[i])
+            now = t >> self.config.tick_bits
+            for h in range(len(self._horizons)):
+                self._drain(maps, h, now)
+            first, support = self._match(now, x, y, p)
+            if first is not None and support >= self.config.need:
+                suppressed[i], source[i], horizon[i] = True, first.source, first.last
+                self._use(first)
+                self._counts["suppressed"] += 1
+            self._remember(maps, _Entry(t, x, y, p, min(self.config.carry, support), self._counts["events"]))
+            self._counts["events"] += 1
+        return Decisions(suppressed=suppressed, source=source, horizon=horizon)
+
+    def _drain(self, maps: tuple[MotionSchedule | Trajectory, ...], h: int, now: int) -> None:
+        """Move every prediction of horizon ``h`` whose gate has opened to its cell; pass those that are not made."""
+        while self._passed[h] < self._stored:
+            entry = self._ring[self._passed[h]]
+            due = (entry.t_us >> self.config.tick_bits) + self._horizons[h]
+            if due - self._early > now:
+                return
+            if h == len(self._horizons) - 1:
+                del self._ring[self._passed[h]]
+            self._passed[h] += 1
+            at, _ = self._place(maps, h, entry)
+            if at is not None and due + self._late >= now:
+                self._write(at, h, due, entry, now)
+
+    def _write(self, at: Bin, h: int, due: int, entry: _Entry, now: int) -> None:
+        """Expect in ``at`` what ``entry`` predicts for horizon ``h``, beside or instead of what is expected there."""
+        cell = self._cell_for(at, now)
+        if self._is_open(cell, now) and cell.bin == at and cell.p == entry.p:
+            if h not in cell.horizons:
+                cell.horizons.add(h)
+            elif self.config.uses:
+                if cell.uses == self.config.uses:
+                    self._counts["overwritten"] += 1
+                cell.uses = min(cell.uses + 1, self.config.uses)
+            cell.support = max(cell.support, entry.support)
+        else:
+            if self._is_open(cell, now):
+                self._counts["overwritten"] += 1
+            cell.bin, cell.p, cell.horizons, cell.uses, cell.support = at, entry.p, {h}, 1, entry.support
+        cell.due, cell.source, cell.last = due, entry.index, h
+
+    def _match(self, now: int, x: int, y: int, p: int) -> tuple[_Cell | None, int]:
+        """Return the nearest candidate and the support of all of them together."""
+        candidates = [cell for cell in self._cells_near(x, y, now) if self._passes(cell, now, p)]
+        if not candidates:
+            return None, 0
+        votes = set().union(*(cell.horizons for cell in candidates))
+        return candidates[0], len(votes) + max(cell.support for cell in candidates)
+
+    def _use(self, cell: _Cell) -> None:
+        """Take one use from a cell that was hit; a latched one stays."""
+        if self.config.uses:
+            cell.uses -= 1
+            if cell.uses == 0:
+                cell.horizons = set()
+
+    def _remember(self, maps: tuple[MotionSchedule | Trajectory, ...], entry: _Entry) -> None:
+        """Store the event, unless its motion gives no prediction or the ring is full."""
+        if self.config.motion_at == "event":
+            places = [self._place(maps, h, entry) for h in range(len(self._horizons))]
+            if all(at is None for at, _ in places):
+                self._counts["outside" if any(beyond for _, beyond in places) else "still"] += 1
+                return
+        if len(self._ring) == self.config.ring_capacity:
+            self._counts["overflow"] += 1
+            return
+        self._ring[self._stored] = entry
+        self._stored += 1
+        self._counts["predicted"] += 1
+        self._counts["ring_high_water"] = max(self._counts["ring_high_water"], len(self._ring))
+
+    def _place(self, maps: tuple[MotionSchedule | Trajectory, ...], h: int, entry: _Entry) -> tuple[Bin | None, bool]:
+        """Return the bin of the prediction for horizon ``h``, ``None`` if not made, and whether it lies outside."""
+        horizon_us = self.config.horizons_us[h]
+        waits_us = horizon_us - self.config.early_gate_us if self.config.motion_at == "gate" else 0
+        x, y = ahead(maps[h], entry.t_us + waits_us, entry.x, entry.y, horizon_us)
+        if not (0 <= x < self.width and 0 <= y < self.height):
+            return None, True
+        if (x - entry.x) ** 2 + (y - entry.y) ** 2 < self.config.least_shift_squared_px:
+            return None, False
+        return (x >> self.config.bin_bits, y >> self.config.bin_bits), False
+
+    def _cells_near(self, x: int, y: int, now: int) -> list[_Cell]:
+        """Return the open cells of the bins in the window, nearest first, each once."""
+        window = [(x + dx, y + dy) for dx, dy in self.config.offsets]
+        bins = dict.fromkeys(
+            (column >> self.config.bin_bits, row >> self.config.bin_bits)
+            for column, row in window
+            if 0 <= column < self.width and 0 <= row < self.height
+        )
+        return [
+            cell
+            for at in bins
+            for cell in self._table.get(self._set_of(at), ())
+            if cell.bin == at and self._is_open(cell, now)
+        ]
+
+    def _passes(self, cell: _Cell, now: int, p: int) -> bool:
+        """Tell whether an event of polarity ``p`` may meet an open cell."""
+        if now < cell.due - self._early:
+            return False
+        return self.config.polarity == "ignore" or (cell.p == p) == (self.config.polarity == "opposite")
+
+    def _is_open(self, cell: _Cell, now: int) -> bool:
+        """Tell whether events can still meet a cell."""
+        return bool(cell.horizons) and now <= cell.due + self._late
+
+    def _cell_for(self, at: Bin, now: int) -> _Cell:
+        """Return the cell to write: the open one of this bin, else the first not open, else the one due first."""
+        where = self._set_of(at)
+        if where not in self._table:
+            self._table[where] = [_Cell() for _ in range(1 if self.config.set_bits is None else self.config.ways)]
+        ways = self._table[where]
+        for cell in ways:
+            if self._is_open(cell, now) and cell.bin == at:
+                return cell
+        for cell in ways:
+            if not self._is_open(cell, now):
+                return cell
+        return min(ways, key=lambda cell: cell.due)
+
+    def _set_of(self, at: Bin) -> Bin:
+        """Return the set in which a bin is kept: its own, or that of the low bits of its column and row."""
+        if self.config.set_bits is None:
+            return at
+        columns, rows = self.config.set_bits
+        return at[0] % (1 << columns), at[1] % (1 << rows)
+
+    def _maps(self) -> tuple[MotionSchedule | Trajectory, ...]:
+        """Return the motion for each horizon."""
+        if isinstance(self.motion, MotionSchedule | tuple):
+            return schedules_for(self.config, self.motion)
+        return (self.motion,) * len(self._horizons)
