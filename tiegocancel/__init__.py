@@ -15,8 +15,11 @@ if TYPE_CHECKING:
     from tiegocancel.files import open_events, open_writer, read_events, write_events
     from tiegocancel.matching.canceller import Canceller, Decisions
     from tiegocancel.matching.config import CancelConfig
+    from tiegocancel.motion.affine import AffineTrajectory
+    from tiegocancel.motion.camera import CameraTrajectory
+    from tiegocancel.motion.intrinsics import CameraIntrinsics
+    from tiegocancel.motion.rotation import RotationTrajectory
     from tiegocancel.motion.schedule import MotionSchedule
-    from tiegocancel.motion.trajectory import RotationTrajectory
 
 __version__ = "0.1.0"
 
@@ -27,6 +30,9 @@ if (_tree / "pyproject.toml").exists() and (_tree / "kernels" / "runtime.py").ex
     __path__.append(str(_tree))
 
 _HOME = {
+    "AffineTrajectory": "tiegocancel.motion.affine",
+    "CameraIntrinsics": "tiegocancel.motion.intrinsics",
+    "CameraTrajectory": "tiegocancel.motion.camera",
     "CancelConfig": "tiegocancel.matching.config",
     "Canceller": "tiegocancel.matching.canceller",
     "ConfigError": "tiegocancel.errors",
@@ -36,7 +42,7 @@ _HOME = {
     "InputError": "tiegocancel.errors",
     "MissingExtraError": "tiegocancel.errors",
     "MotionSchedule": "tiegocancel.motion.schedule",
-    "RotationTrajectory": "tiegocancel.motion.trajectory",
+    "RotationTrajectory": "tiegocancel.motion.rotation",
     "TiegoCancelError": "tiegocancel.errors",
     "open_events": "tiegocancel.files",
     "open_writer": "tiegocancel.files",
@@ -46,6 +52,9 @@ _HOME = {
 
 __all__ = [
     "EVENT_DTYPE",
+    "AffineTrajectory",
+    "CameraIntrinsics",
+    "CameraTrajectory",
     "CancelConfig",
     "Canceller",
     "ConfigError",

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import Any
 
-from tiegocancel.cli.settings import add_cancel_options, add_output_options, settings_from
+from tiegocancel.cli.settings import add_cancel_options, add_estimate_options, add_output_options, settings_from
 
 __all__ = ["DEMO", "add_parser", "run"]
 
@@ -30,8 +29,9 @@ def add_parser(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
     )
     parser.add_argument("--duration", type=float, metavar="S", help="seconds of the scene (0.4)")
     parser.add_argument("--seed", type=int, metavar="N", help="seed of the scene's sensor (1)")
-    parser.add_argument("--motion", metavar="M", help="truth (default), fit, CX,CY,OMEGA or a CSV")
+    parser.add_argument("--motion", metavar="M", help="truth (default), fit, track, CX,CY,OMEGA, a CSV or a schedule")
     add_cancel_options(parser)
+    add_estimate_options(parser)
     add_output_options(parser)
     parser.set_defaults(run=run)
 
@@ -41,15 +41,16 @@ def run(args: argparse.Namespace) -> int:
     settings = settings_from(args, DEMO)
     from tiegocancel.cli.session import Session
     from tiegocancel.events import Events
-    from tiegocancel.motion.source import trajectory_from
     from tiegocancel.scene import ground_truth, photograph, simulate
+    from tiegocancel.study.feed import FixedMotion
+    from tiegocancel.study.motion_source import Found, motion_inputs, open_motion
 
     scene, duration_s, seed = settings.scene, settings.simulate.duration_s, settings.simulate.seed
     if settings.motion.source == "truth":
-        trajectory, fit = ground_truth(scene, duration_s=duration_s), None
+        found = Found(FixedMotion(ground_truth(scene, duration_s=duration_s)))
     else:
-        trajectory, fit = trajectory_from(
-            settings.motion.source,
+        found = open_motion(
+            settings,
             sample=lambda: Events.concatenate(
                 [
                     Events.empty(scene.width, scene.height, labelled=True),
@@ -59,15 +60,15 @@ def run(args: argparse.Namespace) -> int:
             width=scene.width,
             height=scene.height,
         )
-    inputs = [path for path in [Path(settings.motion.source)] if path.is_file()]
-    session = Session(args, settings, title="Built-in scene: a textured disc and a mover", inputs=inputs)
+    session = Session(
+        args, settings, title="Built-in scene: a textured disc and a mover", inputs=motion_inputs(settings)
+    )
     return session.run(
         simulate(scene, duration_s=duration_s, seed=seed),
-        trajectory,
+        found,
         width=scene.width,
         height=scene.height,
         disc_radius_px=scene.rig.radius_px,
-        fit=fit,
         labelled=True,
         notes=[],
         expected_us=round(duration_s * 1e6),

@@ -24,6 +24,7 @@ def add_reading_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--format", metavar="NAME", help="format, where the header does not tell: text, evt2, evt3, dat, …"
     )
+    group.add_argument("--undistort", metavar="CALIB", help="calibration file (TOML, calib.txt, YAML) of the lens")
     group.add_argument("--keep-going", action="store_true", help="keep the events before a fault, and say so")
     group.add_argument("--chunk-events", type=int, metavar="N", help="events read at a time (1048576)")
 
@@ -41,5 +42,6 @@ def reader_from(args: argparse.Namespace, path: Path) -> EventReader:
         columns=args.columns,
         chunk_events=default if args.chunk_events is None else args.chunk_events,
         keep_going=args.keep_going,
+        undistort=args.undistort,
         format=args.format,
     )

@@ -10,11 +10,18 @@ from typing import TYPE_CHECKING
 
 from tiegocancel.cli.options import add_reading_options
 from tiegocancel.cli.progress import event_progress
-from tiegocancel.cli.settings import add_cancel_options, add_output_options, settings_from
+from tiegocancel.cli.settings import (
+    add_cancel_options,
+    add_estimate_options,
+    add_filter_options,
+    add_output_options,
+    settings_from,
+)
 
 if TYPE_CHECKING:
     from tiegocancel.events import Events
     from tiegocancel.files import EventReader
+    from tiegocancel.study.settings import Settings
 
 __all__ = ["add_parser", "run"]
 
@@ -31,9 +38,14 @@ def add_parser(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
     )
     parser.add_argument("source", type=Path, metavar="SOURCE", help="recording: npz, npy, csv, txt, raw, dat, aedat, …")
     parser.add_argument(
-        "--motion", metavar="M", help="fit (default), CX,CY,OMEGA in px and rad/s, or a CSV of a tracker"
+        "--motion",
+        metavar="M",
+        help="fit (default: one rotation), track (estimated on the way from past events), gyro, CX,CY,OMEGA in px and "
+        "rad/s, a CSV of a tracker or of the verb motion, or a schedule file",
     )
     add_cancel_options(parser)
+    add_filter_options(parser)
+    add_estimate_options(parser)
     add_reading_options(parser)
     add_output_options(parser)
     parser.set_defaults(run=run)
@@ -44,37 +56,34 @@ def run(args: argparse.Namespace) -> int:
     settings = settings_from(args)
     from tiegocancel.cli.session import Session
     from tiegocancel.files import open_events
-    from tiegocancel.motion.source import trajectory_from
+    from tiegocancel.study.motion_source import motion_inputs, open_motion
 
     with open_events(args.source, **asdict(settings.read)) as reader:
         with event_progress("finding the motion", None) as advance:
-            trajectory, fit = trajectory_from(
-                settings.motion.source,
-                sample=lambda: _sample(reader, advance),
-                width=reader.width,
-                height=reader.height,
+            found = open_motion(
+                settings, sample=lambda: _sample(reader, settings, advance), width=reader.width, height=reader.height
             )
-        session = Session(args, settings, title=args.source.name, inputs=_inputs(args.source, settings.motion.source))
+        session = Session(args, settings, title=args.source.name, inputs=[args.source, *motion_inputs(settings)])
         return session.run(
             reader,
-            trajectory,
+            found,
             width=reader.width,
             height=reader.height,
             labelled=reader.labelled,
-            fit=fit,
             notes=reader.notes,
         )
 
 
-def _sample(reader: EventReader, advance: Callable[[Events], None]) -> Events:
+def _sample(reader: EventReader, settings: Settings, advance: Callable[[Events], None]) -> Events:
     """Read the events that the fit may look at; a fault further on is left to the run itself."""
     from tiegocancel.errors import TiegoCancelError
     from tiegocancel.events import Events
+    from tiegocancel.study.prefilter import Prefilter
 
     parts = [Events.empty(reader.width, reader.height)]
     count = 0
     try:
-        for chunk in reader:
+        for chunk in Prefilter(settings.filter).kept(reader):
             parts.append(chunk)
             advance(chunk)
             count += len(chunk)
@@ -86,8 +95,3 @@ def _sample(reader: EventReader, advance: Callable[[Events], None]) -> Events:
     if count > SAMPLE_EVENTS:
         reader.notes.append(f"the fit looks at the first {SAMPLE_EVENTS:,} events only")
     return Events.concatenate(parts)[:SAMPLE_EVENTS]
-
-
-def _inputs(source: Path, motion: str) -> list[Path]:
-    """Name the files whose checksums belong into the manifest."""
-    return [path for path in (source, Path(motion)) if path.is_file()]

@@ -16,11 +16,12 @@ from tiegocancel.cli.outputs import OutputFolder
 from tiegocancel.cli.progress import event_progress
 from tiegocancel.cli.summary import summary_text
 from tiegocancel.errors import InputError
+from tiegocancel.estimation.contrast.fit import RotationFit
 from tiegocancel.events import Events
 from tiegocancel.files import EventWriter, open_writer
-from tiegocancel.motion.fit import RotationFit
-from tiegocancel.motion.trajectory import RotationTrajectory
 from tiegocancel.study import INTERRUPTED, RunResult, Settings, Verdict, judge, run_stream
+from tiegocancel.study.feed import MotionFeed, TrackedMotion
+from tiegocancel.study.motion_source import Found
 
 __all__ = ["Session"]
 
@@ -38,13 +39,12 @@ class Session:
     def run(
         self,
         chunks: Iterable[Events],
-        trajectory: RotationTrajectory,
+        found: Found,
         *,
         width: int,
         height: int,
         notes: list[str],
         labelled: bool,
-        fit: RotationFit | None = None,
         disc_radius_px: float | None = None,
         expected_us: int | None = None,
         photograph: NDArray[np.float32] | None = None,
@@ -56,12 +56,13 @@ class Session:
         self.folder.prepare()
         with (
             self._residual_writer(width, height, labelled) as sink,
+            self._estimate_writer(found.feed),
             event_progress("cancelling", expected_us) as advance,
         ):
             result = run_stream(
                 chunks,
                 self.settings,
-                trajectory,
+                found.feed,
                 sink=sink,
                 disc_radius_px=disc_radius_px,
                 expected_us=expected_us,
@@ -69,11 +70,13 @@ class Session:
             )
         if sink is not None:
             notes = [*notes, *sink.notes]
-        for note in [*notes, *trajectory.notes, *(() if result is None else result.notes)]:
+        notes += [f"refining: {diagnosis.text}" for diagnosis in found.diagnoses]
+        said = () if result is None else (*result.trajectory.notes, *result.notes)
+        for note in [*notes, *said]:
             sys.stderr.write(f"note: {note}\n")
         if result is None:
             raise InputError(self.title, "", "holds no events")
-        self._write(result, judge(result), fit, notes, photograph)
+        self._write(result, judge(result), found.fit, notes, photograph)
         if result.fault is None:
             return 0
         sys.stderr.write(f"tiegocancel: {result.fault}\n")
@@ -92,6 +95,18 @@ class Session:
         sidecar = path.with_name(path.name + ".labels.npy")
         if sidecar.exists():
             self.folder.file(sidecar.name)
+
+    @contextlib.contextmanager
+    def _estimate_writer(self, feed: MotionFeed) -> Iterator[None]:
+        """Write the rows of a motion that is found on the way, as they come."""
+        if not isinstance(feed, TrackedMotion):
+            yield
+            return
+        from tiegocancel.estimation.estimates_csv import EstimateWriter
+
+        with EstimateWriter(self.folder.file("motion.csv")) as writer:
+            feed.sink = writer.extend
+            yield
 
     def _write(
         self,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from tiegocancel.metrics import Share
 from tiegocancel.study import RunResult, Verdict
 from tiegocancel.study.controls import CONTROLS
+from tiegocancel.study.prefilter import filter_text
 from tiegocancel.units import rate_text
 
 __all__ = ["summary_text"]
@@ -12,7 +13,6 @@ __all__ = ["summary_text"]
 
 def summary_text(result: RunResult, verdict: Verdict) -> str:
     """Return the headline, the ratios beside their controls and what they rest on."""
-    (cx, cy), omega = result.trajectory.mean(start_us=result.first_us, stop_us=result.last_us)
     share = result.tally.share()
     lines = [
         verdict.headline,
@@ -20,7 +20,8 @@ def summary_text(result: RunResult, verdict: Verdict) -> str:
         f"{result.counters.suppressed:,} suppressed",
         f"  counted      {share.events:,}; {result.tally.warm_up_events:,} left out, warm-up "
         f"{result.settings.cancel.warm_up_us / 1000:g} ms",
-        f"  motion       centre ({cx:.1f}, {cy:.1f}) px, ω {omega:+.4f} rad/s ({result.trajectory.source})",
+        f"  motion       {result.trajectory.described(start_us=result.first_us, stop_us=result.last_us)} "
+        f"({result.trajectory.source})",
         f"  {'':22}all" + ("      disc" if result.lead_region else ""),
     ]
     tallies = {"cancellation ratio": result.tally}
@@ -33,6 +34,18 @@ def summary_text(result: RunResult, verdict: Verdict) -> str:
         causes = ", ".join(f"{cause} {_text(selectivity[cause])}" for cause in ("ego", "mover", "noise"))
         j = selectivity["j"]
         lines.append(f"  by label     {causes}" + ("" if j is None else f": J = {j:.3f}"))
+    if result.filtered is not None and result.filter_state is not None:
+        lines.append(f"  filters      {filter_text(result.filtered, result.filter_state)}")
+    if result.guard is not None:
+        lines.append(
+            f"  guard        closed {result.guard['closures']:,} ×, opened {result.guard['openings']:,} ×; "
+            f"{result.guard['passed']:,} hits let through"
+        )
+    if result.estimates:
+        confident = sum(estimate.confident for estimate in result.estimates)
+        lines.append(f"  estimates    {len(result.estimates):,}, {confident:,} of them confident")
+    if result.diagnosis is not None:
+        lines.append(f"  diagnosis    {result.diagnosis.text}")
     speed = rate_text(result.counters.events / result.seconds) if result.seconds else "–"
     lines.append(f"  speed        {speed}; state {result.state.total_kib:,.0f} KiB")
     return "\n".join(lines) + "\n"

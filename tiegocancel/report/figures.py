@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from tiegocancel.report.images import before_after, scene, time_slices
-from tiegocancel.report.plots import controls, displacement, radial_profile, rate
+from tiegocancel.report.motion import motion_figure
+from tiegocancel.report.plots import controls, displacement, radial_profile, rate, residual_profile
 from tiegocancel.report.style import STYLE
 from tiegocancel.study.result import RunResult
 
@@ -71,6 +72,20 @@ _FIGURES: tuple[tuple[str, str, Callable[[RunResult], Figure | None], str], ...]
         "Where events met their predictions. In space a cloud centred on zero means that the motion is right, a "
         "shifted cloud that it is not, one that fills the gate chance. In time it leans to early: the first event "
         "inside the gate takes the prediction.",
+    ),
+    (
+        "residual_profile",
+        "Centre or speed",
+        lambda result: residual_profile(result.residuals, result.diagnosis),
+        "Where real events lie beside their predictions, ring by ring. A wrong speed turns the outer rings away, a "
+        "wrong centre moves all rings alike; a profile along zero means that neither stands out.",
+    ),
+    (
+        "motion",
+        "The motion found on the way",
+        lambda result: motion_figure(result.estimates) if result.estimates else None,
+        "Every estimate uses events before it alone and holds from its own time on. Bands are two standard deviations; "
+        "where they are grey the window did not tell the motion.",
     ),
     (
         "rate",

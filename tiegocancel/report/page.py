@@ -10,6 +10,7 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
+from tiegocancel.matching.config import CancelConfig
 from tiegocancel.report.figures import Drawing
 from tiegocancel.study.controls import CONTROLS
 from tiegocancel.study.result import RunResult
@@ -136,12 +137,18 @@ def _detail_tables(result: RunResult, numbers: dict[str, Any]) -> list[tuple[str
         ("ring capacity", f"{cancel.ring_capacity:,} predictions"),
         ("motion path", result.settings.motion.path),
     ]
+    if not cancel.is_plain:
+        point.append(("selective rule", _selective_words(cancel)))
     turning = [
-        ("centre", f"({motion['center_px'][0]:.1f}, {motion['center_px'][1]:.1f}) px"),
-        ("angular velocity ω", f"{motion['omega_rad_s']:+.4f} rad/s"),
+        ("mean", motion["described"]),
         ("source", motion["source"]),
         ("rim displacement within Δt", f"{motion['rim_displacement_px']:.1f} px"),
     ]
+    if result.estimates:
+        rows = f"{motion['estimates']:,}, {motion['estimates_confident']:,} confident"
+        turning.append(("estimates on the way", rows))
+    if result.diagnosis is not None:
+        turning.append(("diagnosis", result.diagnosis.text))
     rest = [
         ("CR (causal)", f"{numbers['cancellation_ratio']:.2%}"),
         ("CR_pairs (thesis, offline)", f"{numbers['cancellation_ratio_pairs']:.2%}"),
@@ -164,6 +171,26 @@ def _detail_tables(result: RunResult, numbers: dict[str, Any]) -> list[tuple[str
         rest.append(("mean lateness", f"{found['mean_late_us']:+.0f} µs"))
     counts = [(name.replace("_", " "), f"{value:,}") for name, value in numbers["counters"].items()]
     return [("Operating point", point), ("Motion", turning), ("Residual", rest), ("Counters", counts)]
+
+
+def _selective_words(cancel: CancelConfig) -> str:
+    """Say what the configuration has beyond the plain rule."""
+    words = [f"need {cancel.need} of support", f"carry {cancel.carry}"]
+    if cancel.more_horizons_us:
+        words.append("more horizons " + ", ".join(f"{horizon_us:,} µs" for horizon_us in cancel.more_horizons_us))
+    words.append("cells latched" if cancel.uses == 0 else f"{cancel.uses} use(s) a cell")
+    words.append(f"gate −{cancel.early_gate_us:,} to +{cancel.late_gate_us:,} µs")
+    if cancel.tick_bits:
+        words.append(f"tick {1 << cancel.tick_bits} µs")
+    if cancel.bin_bits:
+        words.append(f"bins of {1 << cancel.bin_bits}×{1 << cancel.bin_bits} px")
+    if cancel.set_bits is not None:
+        words.append(f"{1 << cancel.set_bits[0]}×{1 << cancel.set_bits[1]} sets of {cancel.ways}")
+    if cancel.least_shift_px:
+        words.append(f"least shift {cancel.least_shift_px:g} px")
+    if cancel.motion_at == "gate":
+        words.append("motion of the time when the gate opens")
+    return ", ".join(words)
 
 
 def _details(heading: str, rows: list[tuple[str, str]]) -> str:

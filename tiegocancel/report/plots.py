@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
+from tiegocancel.estimation.diagnosis.diagnose import Diagnosis
+from tiegocancel.metrics.residual_profile import ResidualProfile
 from tiegocancel.report import style
 from tiegocancel.study.controls import CONTROLS
 from tiegocancel.study.result import RunResult
 
-__all__ = ["controls", "displacement", "radial_profile", "rate"]
+__all__ = ["controls", "displacement", "radial_profile", "rate", "residual_profile"]
 
 
 def controls(result: RunResult) -> Figure | None:
@@ -125,4 +129,54 @@ def rate(result: RunResult) -> Figure | None:
     axes.set(xlabel="time since the first event (ms)", ylabel=unit, ylim=(0, None), xlim=(0, edges_ms[-1]))
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.1)
     style.tidy(axes)
+    return drawn
+
+
+def residual_profile(profile: ResidualProfile, diagnosis: Diagnosis | None = None) -> Figure | None:
+    """Draw where events met their predictions by distance from the centre, along the ring and outward (§3.6 (5)).
+
+    With a diagnosis, its rings and its model beside them: the turn that a wrong ω makes, the move that a wrong centre
+    makes. Its words are the title.
+    """
+    seen = profile.count >= 50
+    if not seen.any():
+        return None
+    middle = ((profile.ring_edges_px[1:] + profile.ring_edges_px[:-1]) / 2)[seen]
+    drawn = style.figure(10.5, 3.4)
+    left, right = drawn.subplots(1, 2, sharey=True)
+    for panel, mean, spread, name in (
+        (left, profile.tangential_px, profile.tangential_spread_px, "along the ring"),
+        (right, profile.radial_px, profile.radial_spread_px, "outward"),
+    ):
+        panel.plot(middle, mean[seen], color=style.RESIDUAL, linewidth=1.6, label=f"matches, {name}: mean ± spread")
+        low, high = (mean + sign * spread for sign in (-1, 1))
+        panel.fill_between(middle, low[seen], high[seen], color=style.RESIDUAL, alpha=0.15, linewidth=0)
+    if diagnosis is not None and diagnosis.kind != "unknown":
+        turn = (diagnosis.omega_rad_s - diagnosis.omega_bias_rad_s) * diagnosis.horizon_us * 1e-6
+        shrink, sine = 1.0 - math.cos(turn), math.sin(turn)
+        x, y = diagnosis.center_bias_px
+        turned = -diagnosis.omega_bias_rad_s * diagnosis.horizon_us * 1e-6 * middle
+        left.plot(middle, turned, color=style.INK, linestyle="--", linewidth=1.0, label="model: wrong ω")
+        radius = [ring.radius_px for ring in diagnosis.rings]
+        marks = {"fmt": "o", "markersize": 3.5, "capsize": 2}
+        left.errorbar(
+            radius, [ring.turning_px for ring in diagnosis.rings], [ring.turning_sigma_px for ring in diagnosis.rings],
+            color=style.INK, label="all pairs, turning", **marks,
+        )  # fmt: skip
+        flats = ((-shrink * x - sine * y, style.ON, "right", "x"), (sine * x - shrink * y, style.OFF, "down", "y"))
+        for value, colour, way, axis in flats:
+            right.axhline(value, color=colour, linestyle="--", linewidth=1.0, label=f"model: wrong centre, {axis}")
+            right.errorbar(
+                radius, [getattr(ring, f"{way}_px") for ring in diagnosis.rings],
+                [ring.flat_sigma_px for ring in diagnosis.rings], color=colour, label=f"all pairs, {axis}", **marks,
+            )  # fmt: skip
+    if diagnosis is not None:
+        drawn.suptitle(diagnosis.text, fontsize=9, x=0.01, ha="left")
+    left.set(title="along the ring: a wrong ω grows with the radius", ylabel="event − prediction (px)")
+    right.set(title="the same all round: a wrong centre")
+    for panel in (left, right):
+        panel.set(xlabel="distance from the centre (px)", xlim=(max(0.0, middle[0] - 4), middle[-1] + 4))
+        panel.axhline(0, color=style.MUTED, linewidth=0.8)
+        panel.legend(fontsize=7, ncols=2)
+        style.tidy(panel)
     return drawn

@@ -41,6 +41,11 @@ class Control:
     def __init__(self, canceller: Canceller, tally: Tally) -> None:
         self.canceller, self.tally = canceller, tally
 
+    @property
+    def oldest_us(self) -> int | None:
+        """Time of the oldest event that is not decided yet."""
+        return None
+
     def process(self, events: Events) -> None:
         """Take a chunk."""
         self.tally.add(events, self.canceller.process(events).suppressed)
@@ -62,6 +67,11 @@ class ShuffledControl(Control):
         self._held: list[Events] = []
         self._count = 0
         self.shortest_us: int | None = None
+
+    @property
+    def oldest_us(self) -> int | None:
+        """Time of the oldest event that is not decided yet."""
+        return int(self._held[0].t[0]) if self._count else None
 
     def process(self, events: Events) -> None:
         """Take a chunk; decide whenever a block is full."""

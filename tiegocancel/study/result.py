@@ -6,10 +6,17 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
+from tiegocancel.estimation.diagnosis.diagnosis import Diagnosis
+from tiegocancel.estimation.estimate import MotionEstimate
+from tiegocancel.filters import FilterCounters, FilterStateBits
 from tiegocancel.firmware_sim.state import StateBits, state_bits
 from tiegocancel.matching.canceller import Counters
-from tiegocancel.metrics import DiscRegion, DisplacementHistogram, RateProfile, Tally
-from tiegocancel.motion.trajectory import RotationTrajectory
+from tiegocancel.metrics import DiscRegion, DisplacementHistogram, RateProfile, ResidualProfile, Tally
+from tiegocancel.motion.rotation import RotationTrajectory
+from tiegocancel.motion.trajectory import Trajectory
+from tiegocancel.study.prefilter import filter_numbers
 from tiegocancel.study.settings import Settings
 from tiegocancel.study.stretch import Densest
 
@@ -25,11 +32,13 @@ class RunResult:
 
     ``fault`` is the line of the error that ended the stream early, if one did; the rest describes what came before.
     ``seconds`` is the time inside ``Canceller.process``; ``disc_seen``: a disc was declared or found, otherwise
-    ``region`` is the circle that holds 99 % of the events.
+    ``region`` is the circle that holds 99 % of the events. ``estimates`` are the rows of a motion that was found on the
+    way, ``diagnosis`` what the events say of one that was known before. ``filtered`` and ``filter_state`` are of the
+    filters that events passed first, ``guard`` is the summary of the guard, ``None`` where there is none.
     """
 
     settings: Settings
-    trajectory: RotationTrajectory
+    trajectory: Trajectory
     region: DiscRegion
     disc_seen: bool
     width: int
@@ -39,11 +48,17 @@ class RunResult:
     tally: Tally
     controls: dict[str, Tally]
     displacement: DisplacementHistogram
+    residuals: ResidualProfile
     rate: RateProfile
     picture: Densest
     slice: Densest
     counters: Counters
     seconds: float
+    estimates: tuple[MotionEstimate, ...] = ()
+    diagnosis: Diagnosis | None = None
+    filtered: FilterCounters | None = None
+    filter_state: FilterStateBits | None = None
+    guard: dict[str, Any] | None = None
     fault: str | None = None
     notes: tuple[str, ...] = ()
 
@@ -64,14 +79,38 @@ class RunResult:
 
     @property
     def rim_displacement_px(self) -> float:
-        """How far the rim of the disc moves within the horizon: the chord ``2·r·|sin(ωΔt/2)|`` (eq. 4.7)."""
+        """How far the rim of the disc moves within the horizon: the chord ``2·r·|sin(ωΔt/2)|`` (eq. 4.7).
+
+        Of a motion that is no rotation, how far a grid of pixels moves on average, half-way through the stream.
+        """
+        if not isinstance(self.trajectory, RotationTrajectory):
+            return self._mean_displacement_px()
         angle = self.omega_rad_s * self.settings.cancel.horizon_us * 1e-6
         return abs(2 * self.region.radius_px * math.sin(angle / 2))
+
+    def _mean_displacement_px(self) -> float:
+        """Return the mean length of the displacement over a grid of pixels."""
+        x, y = (
+            grid.ravel()
+            for grid in np.meshgrid(
+                *(np.linspace(0, side - 1, 9).astype(np.uint16) for side in (self.width, self.height))
+            )
+        )
+        middle = np.full(len(x), (self.first_us + self.last_us) // 2, np.int64)
+        ahead_x, ahead_y = self.trajectory.predict(middle, x, y, self.settings.cancel.horizon_us)
+        return float(np.hypot(ahead_x - x.astype(np.int64), ahead_y - y.astype(np.int64)).mean())
 
     @property
     def omega_rad_s(self) -> float:
         """Mean angular velocity over the events' span."""
         return self.trajectory.mean(start_us=self.first_us, stop_us=self.last_us)[1]
+
+    def _estimate_numbers(self) -> dict[str, Any]:
+        """Count the rows of a motion that was found on the way."""
+        if not self.estimates:
+            return {}
+        confident = sum(estimate.confident for estimate in self.estimates)
+        return {"estimates": len(self.estimates), "estimates_confident": confident}
 
     def to_json(self) -> dict[str, Any]:
         """Return the numbers of the report, warm-up excluded from every ratio."""
@@ -103,15 +142,21 @@ class RunResult:
             },
             "signal_to_noise": self.tally.signal_to_noise(),
             "motion": {
-                "center_px": [float(center[0]), float(center[1])],
+                "center_px": None if center is None else [float(center[0]), float(center[1])],
                 "omega_rad_s": float(omega),
                 "source": self.trajectory.source,
                 "rim_displacement_px": self.rim_displacement_px,
+                "described": self.trajectory.described(start_us=self.first_us, stop_us=self.last_us),
+                **self._estimate_numbers(),
             },
+            "diagnosis": None if self.diagnosis is None else self.diagnosis.summary(),
             "selectivity": self.tally.selectivity(),
             "selectivity_of_controls": {name: control.selectivity() for name, control in self.controls.items()},
             "displacement": self.displacement.summary(),
+            "residual_profile": self.residuals.summary(),
             "counters": dict(self.counters),
+            "filter": filter_numbers(self.filtered, self.filter_state),
+            "guard": self.guard,
             "warm_up": {
                 "us": self.settings.cancel.warm_up_us,
                 "events_left_out": self.tally.warm_up_events,

@@ -6,6 +6,7 @@ import json
 import os
 import re
 from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,8 @@ import pytest
 
 from tiegocancel import Events, read_events, write_events
 from tiegocancel.cli import main
+from tiegocancel.matching.config import CancelConfig
+from tiegocancel.matching.presets import PRESETS
 
 CENTER, OMEGA = (60.0, 50.0), 20.0
 MOTION = f"{CENTER[0]},{CENTER[1]},{OMEGA}"
@@ -81,14 +84,34 @@ def test_flags_override_the_file_which_overrides_the_defaults(
     out = tmp_path / "out"
     run_json(capsys, "run", source, "--config", config, "--horizon-us", 7000, "--out", out, "--json")
     settings = json.loads((out / "manifest.json").read_text(encoding="utf-8"))["settings"]
-    assert settings["cancel"] == {
-        "horizon_us": 7000, "tolerance_us": 1000, "tolerance_px": 1.0, "polarity": "opposite", "ring_capacity": 65_536,
-    }  # fmt: skip
+    default = CancelConfig()
+    changed = {key for key, value in settings["cancel"].items() if value != _listed(getattr(default, key))}
+    assert changed == {"horizon_us", "tolerance_px"}
+    assert (settings["cancel"]["horizon_us"], settings["cancel"]["tolerance_px"]) == (7000, 1.0)
     assert settings["read"]["format"] == "npz"
     assert not list(out.glob("*.png"))
     config.write_text('[read]\nformat = "evt3"\n', encoding="utf-8")
     assert main(["run", str(source), "--config", str(config), "--motion", MOTION, "--out", str(out)]) == 1
     assert "ring.npz" in capsys.readouterr().err
+
+
+def _listed(value: object) -> object:
+    """Return a value as JSON gives it back."""
+    return list(value) if isinstance(value, tuple) else value
+
+
+def test_a_preset_lies_under_file_and_flags(source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    config = tmp_path / "run.toml"
+    config.write_text('[cancel]\npreset = "lean"\nneed = 2\n', encoding="utf-8")
+    out = tmp_path / "out"
+    given = ("--motion", MOTION, "--config", config, "--carry", 7, "--no-figures", "--out", out, "--json")
+    run_json(capsys, "run", source, *given)
+    cancel = json.loads((out / "manifest.json").read_text(encoding="utf-8"))["settings"]["cancel"]
+    assert cancel == {key: _listed(value) for key, value in asdict(CancelConfig()).items()} | {
+        **PRESETS["lean"], "need": 2, "carry": 7,
+    }  # fmt: skip
+    assert main(["run", str(source), "--motion", MOTION, "--preset", "selectiv", "--out", str(out)]) == 2
+    assert "did you mean 'selective'?" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -265,3 +288,124 @@ def test_a_file_name_that_is_no_text_is_reported_on(source: Path, tmp_path: Path
     odd.write_bytes(source.read_bytes())
     assert main(["run", str(odd), "--motion", MOTION, "--no-figures", "--out", str(tmp_path / "o")]) == 0
     assert json.loads((tmp_path / "o" / "manifest.json").read_text(encoding="utf-8"))["results"]["events"] > 0
+
+
+@pytest.fixture(scope="module")
+def shaken(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A camera that pans and rolls fast for 0.3 s, with gyroscope and calibration beside the recording."""
+    folder = tmp_path_factory.mktemp("shaken")
+    (folder / "fast.toml").write_text(
+        "[camera_scene]\nwidth = 240\nheight = 180\n[camera_scene.motion]\npan_rad_s = 1.5\ntilt_rad_s = 1.2\n"
+        "roll_rad_s = 2.0\npan_drift_rad_s = 1.0\n",
+        encoding="utf-8",
+    )
+    path = folder / "cam.npz"
+    arguments = ["--scene", "camera", "--duration", "0.3", "--config", str(folder / "fast.toml")]
+    assert main(["simulate", str(path), *arguments]) == 0
+    return path
+
+
+def test_a_gyroscope_with_calibration_beats_every_control_and_the_turn_about_one_axis(
+    shaken: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    gyro, lens = shaken.with_name("cam.gyro.csv"), shaken.with_name("cam.calibration.toml")
+    common = ("run", shaken, "--motion", "gyro", "--gyro", gyro, "--horizon-us", 20_000, "--no-figures", "--json")
+    whole = run_json(capsys, *common, "--calibration", lens, "--out", tmp_path / "three")
+    controls = whole["controls"]
+    assert whole["cancellation_ratio"] > 0.4 > 2 * max(controls.values())  # type: ignore[attr-defined, operator]
+    assert whole["selectivity"]["j"] > 0.3  # type: ignore[index]
+    assert "camera turns" in whole["motion"]["described"]  # type: ignore[index]
+    assert any("px off" in note for note in whole["notes"])  # type: ignore[attr-defined]
+    manifest = json.loads((tmp_path / "three" / "manifest.json").read_text(encoding="utf-8"))
+    assert [Path(record["path"]).name for record in manifest["inputs"]] == [
+        "cam.npz", "cam.gyro.csv", "cam.calibration.toml",
+    ]  # fmt: skip
+    rolled = run_json(capsys, *common, "--out", tmp_path / "one")
+    assert rolled["cancellation_ratio"] < 0.5 * whole["cancellation_ratio"]  # type: ignore[operator]
+    assert any("the camera's axes are x,y,z" in note for note in rolled["notes"])  # type: ignore[attr-defined]
+    assert (tmp_path / "one" / "motion.csv").exists()
+
+
+def test_events_and_gyroscope_are_fused(shaken: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    gyro = shaken.with_name("cam.gyro.csv")
+    numbers = run_json(
+        capsys, "run", shaken, "--motion", "track", "--gyro", gyro, "--no-figures", "--json", "--out", tmp_path
+    )
+    assert numbers["motion"]["source"] == "track, cam.gyro.csv"  # type: ignore[index]
+    assert numbers["motion"]["estimates"] > 250  # type: ignore[index]
+    assert any("the camera's axes" in note for note in numbers["notes"])  # type: ignore[attr-defined]
+
+
+def test_a_schedule_file_runs_as_the_file_that_made_it_and_for_its_horizon_alone(
+    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from tiegocancel import RotationTrajectory
+    from tiegocancel.motion.schedule_file import write_schedule
+
+    track, made = tmp_path / "m.csv", tmp_path / "m.schedule"
+    times = np.array([0, 25_000, 60_000])
+    motion = RotationTrajectory(t_us=times, center_px=np.array([CENTER] * 3), omega_rad_s=np.array([19, 20.5, 20.0]))
+    motion.to_csv(track)
+    write_schedule(motion.schedule(12_000), made)
+    common = ("--horizon-us", 12_000, "--no-figures", "--json")
+    by_csv = run_json(capsys, "run", source, "--motion", track, *common, "--out", tmp_path / "a")
+    by_schedule = run_json(capsys, "run", source, "--motion", made, *common, "--out", tmp_path / "b")
+    assert by_csv["counters"] == by_schedule["counters"]
+    assert read_events(tmp_path / "a/residual.npz").t.tolist() == read_events(tmp_path / "b/residual.npz").t.tolist()
+    assert by_schedule["cancellation_ratio"] > 0.5
+    arguments = ["run", str(source), "--motion", str(made), "--horizon-us", "9000", "--out", str(tmp_path / "c")]
+    assert main(arguments) == 2
+    assert "made for a horizon of 12000 µs, the run has 9000 µs (--horizon-us)" in capsys.readouterr().err
+
+
+def test_refining_says_what_was_wrong(source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    common = ("--horizon-us", 10_000, "--no-figures", "--no-controls", "--json", "--out", tmp_path / "o")
+    numbers = run_json(capsys, "run", source, "--motion", "61.5,48.5,19", "--refine", *common)
+    notes = " ".join(numbers["notes"])  # type: ignore[arg-type]
+    assert "refining:" in notes
+    assert main(["run", str(source), "--motion", "track", "--refine", "--out", str(tmp_path / "x")]) == 2
+    assert "--refine: track follows the motion by itself" in capsys.readouterr().err
+
+
+def test_the_demo_tracks_its_own_motion(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    config = tmp_path / "small.toml"
+    config.write_text("[scene]\nwidth = 320\nheight = 180\n", encoding="utf-8")
+    arguments = (
+        "demo",
+        "--motion",
+        "track",
+        "--duration",
+        "0.15",
+        "--config",
+        config,
+        "--out",
+        tmp_path / "o",
+        "--json",
+    )
+    numbers = run_json(capsys, *arguments)
+    assert numbers["motion"]["omega_rad_s"] == pytest.approx(3.6, rel=0.1)  # type: ignore[index]
+    assert numbers["verdict"]["grade"] == "selective"  # type: ignore[index]
+    outputs = json.loads((tmp_path / "o" / "manifest.json").read_text(encoding="utf-8"))["outputs"]
+    assert {"motion.csv", "motion.png", "residual_profile.png"} <= set(outputs)
+    assert "The motion found on the way" in (tmp_path / "o" / "report.html").read_text(encoding="utf-8")
+
+
+def test_rows_survive_a_torn_recording(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["simulate", str(tmp_path / "d.raw"), "--duration", "0.1", "--width", "320", "--height", "180"]) == 0
+    torn = tmp_path / "torn.raw"
+    torn.write_bytes((tmp_path / "d.raw").read_bytes()[:-10_001])
+    out = tmp_path / "out"
+    assert main(["run", str(torn), "--motion", "track", "--no-figures", "--out", str(out)]) == 1
+    assert re.search(r"torn\.raw: byte \d+", capsys.readouterr().err)
+    results = json.loads((out / "manifest.json").read_text(encoding="utf-8"))["results"]
+    assert results["fault"]
+    assert len((out / "motion.csv").read_text(encoding="utf-8").splitlines()) == 1 + results["motion"]["estimates"] > 2
+
+
+def test_a_recording_in_which_nothing_moves_is_passed_on_whole(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_events(tmp_path / "one.npz", Events([5], [1], [2], [1], 8, 8))  # type: ignore[arg-type]
+    numbers = run_json(capsys, "run", tmp_path / "one.npz", "--motion", "track", "--out", tmp_path / "o", "--json")
+    assert (numbers["events"], numbers["suppressed"]) == (1, 0)
+    assert any("no motion was found" in note for note in numbers["notes"])  # type: ignore[attr-defined]

@@ -7,6 +7,7 @@ import json
 import os
 import signal
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -279,3 +280,11 @@ def test_a_fault_in_the_stream_keeps_what_came_before_it() -> None:
     assert result.fault == "f.raw: byte 12: the file ends inside a word"
     assert sum(map(len, kept)) == 1000 - result.counters.suppressed
     assert run_stream([], settings(), trajectory) is None
+
+
+def test_the_zero_motion_control_predicts_the_same_place_whatever_the_least_shift() -> None:
+    events = scene()
+    plain = run(events, settings())
+    wanted = settings()
+    shifted = run(events, replace(wanted, cancel=replace(wanted.cancel, least_shift_px=1.0)))
+    assert shifted.controls["zero_motion"].share().ratio == plain.controls["zero_motion"].share().ratio > 0.0
