@@ -26,6 +26,15 @@ class InputError(TiegoCancelError):
         super().__init__(": ".join(part for part in (self.path, where, problem) if part))
 
 
+class LinkError(TiegoCancelError):
+    """Report a fault of a link or a device at its end: which one, what happened (exit code 1)."""
+
+    def __init__(self, port: str, problem: str) -> None:
+        self.port = port
+        self.problem = problem
+        super().__init__(f"{port}: {problem}" if port else problem)
+
+
 class MissingExtraError(TiegoCancelError):
     """Report an optional package that a task needs, with the extra that installs it (exit code 1)."""
 
