@@ -39,7 +39,11 @@ class TextLine:
 
 
 class Decoder(Protocol):
-    """Decode a byte stream that may be cut anywhere; times in µs never decrease."""
+    """Decode a byte stream that may be cut anywhere; times in µs never decrease.
+
+    ``width`` and ``height`` in px are those of the events returned; of a protocol that tells the size, they change
+    with what it tells, and so does every later chunk.
+    """
 
     width: int
     height: int
@@ -47,6 +51,10 @@ class Decoder(Protocol):
 
     def feed(self, data: bytes) -> Events:
         """Take bytes; return the events that are complete, in order. What is cut waits for the next call."""
+        ...
+
+    def settle(self) -> Events:
+        """Return what was held back until its successor confirms it: call it when the line is silent or has ended."""
         ...
 
     def take_lines(self) -> list[TextLine]:
