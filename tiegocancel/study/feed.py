@@ -107,7 +107,8 @@ class TrackedMotion:
     """Estimate the motion from the events themselves, causally: each row holds from its own time on.
 
     Until the first row nothing is predicted. ``estimates`` keeps every row; ``sink``, where it is set, takes them too.
-    ``notes`` are remarks on what the estimator is given, for the user.
+    ``notes`` are remarks on what the estimator is given, for the user. ``most_rows`` bounds the rows kept of a stream
+    without end: the older half is forgotten whenever there are more.
 
     ``hold_us`` makes it fail open; a run sets it from its settings, 0 never does. A motion is used for at most
     ``hold_us`` after the last confident row, through doubtful rows and where rows are missing; then it is unknown, and
@@ -125,8 +126,10 @@ class TrackedMotion:
         self.sink: Callable[[list[MotionEstimate]], None] | None = None
         self.hold_us = 0
         self._size = (0, 0)
+        self.most_rows: int | None = None
         self._estimator = estimator
         self._known: list[MotionEstimate] = []
+        self._sure_us: list[int] = []
 
     def advance(self, chunk: Events) -> None:
         """Take the rows that a chunk makes due."""
@@ -135,7 +138,12 @@ class TrackedMotion:
         self.estimates += rows
         if self.sink is not None:
             self.sink(rows)
-        self._known += [row for row in rows if row.has_center]
+        known = [row for row in rows if row.has_center]
+        self._known += known
+        self._sure_us += [row.t_us for row in known if row.confident]
+        if self.most_rows is not None and len(self.estimates) > self.most_rows:
+            for kept in (self.estimates, self._known, self._sure_us):
+                del kept[: max(len(kept) - self.most_rows // 2, 0)]
 
     def schedule(self, horizon_us: int, *, start_us: int, stop_us: int, step_us: int) -> MotionSchedule:
         """Return the displacements that rows up to ``stop_us`` give."""
@@ -166,7 +174,7 @@ class TrackedMotion:
 
     def _doubtful(self, start_us: int, stop_us: int) -> list[tuple[int, int]]:
         """Return the stretches ``[from, to)`` in µs from ``start_us`` on in which no confident row is recent."""
-        sure = [row.t_us for row in self._known if row.confident]
+        sure = self._sure_us
         first = bisect.bisect_right(sure, start_us) - 1
         begun = [] if first >= 0 else [(min(start_us, self._known[0].t_us), sure[0] if sure else stop_us + 1)]
         ends = [*sure[max(first, 0) :], stop_us + 1] if sure else []
