@@ -16,10 +16,11 @@ PACKED_TIME_BITS = 30
 class StateBits:
     """Widths and totals in bits; pointers and counters, a few words, and the schedule's rows are left out.
 
-    ``ring = ring_entry · ring_capacity + index``; ``table = cell · cells``. ``time``: a cell's stamp; ``address``: a
-    place on the sensor; ``support``: the carried support, in entry and cell; ``index``: where in the ring each tick
-    begins, 0 where the entries hold their own time; ``tag``: which bin a cell of a set serves; ``sweep_ticks``: every
-    cell is looked at once in so many ticks, 0 where the host moves the base of the times instead.
+    ``ring = ring_entry · (capacities of all rings) + index``; ``table = cell · cells``. ``time``: a cell's stamp;
+    ``address``: a place on the sensor; ``support``: the carried support, in entry and cell; ``index``: where in the
+    ring each tick begins, 0 where the entries hold their own time; ``tag``: which bin a cell of a set serves;
+    ``sweep_ticks``: every cell is looked at once in so many ticks, 0 where the host moves the base of the times
+    instead.
     """
 
     time: int
@@ -63,10 +64,13 @@ def state_bits(config: CancelConfig, *, width: int, height: int, time_bits: int 
       **T needs 2^T > G, and a sweep that looks at every cell once in any** ``2^T − G`` **ticks and empties the closed
       ones hides every alias**. Emptying them shows in no decision and no count: closed is closed, for time does not go
       back. Of open ways the one due first has the least ``r``. The default ``T`` leaves the sweep a quarter of ``G``.
+    - Where OFF has gates of its own, a cell's ``late`` is that of its polarity, ``G`` takes the wider of each, and an
+      event also asks ``r ≤ early + late`` of that polarity.
     - Of an entry the device must know its age, from 0 to ``A = Δ_n + late``; one older is past every gate, and a
       pointer for each horizon, moved by the clock, tells where those end. That takes ``2^R > A + 1`` in every entry or,
       entries being in order, the place where each of ``A + 1`` ticks begins; the smaller one is counted. The tick
-      stands for the time where a schedule changes at whole ticks only.
+      stands for the time where a schedule changes at whole ticks only. Where events choose a horizon, each has its
+      ring, with an ``A`` of its own, and every entry the stamp of the longest.
 
     ``ValueError`` says the least ``T``.
     """
@@ -84,7 +88,7 @@ def state_bits(config: CancelConfig, *, width: int, height: int, time_bits: int 
         time=time_bits,
         address=address,
         ring_entry=ring_entry,
-        ring=ring_entry * config.ring_capacity,
+        ring=ring_entry * sum(config.ring_capacities),
         cell=cell,
         table=cell * width * height,
         cells=width * height,
@@ -105,9 +109,11 @@ def _selective_bits(config: CancelConfig, width: int, height: int, time_bits: in
         )
     support = config.carry.bit_length()
     address = (width - 1).bit_length() + (height - 1).bit_length()
+    rings = config.ring_capacities
+    due = [horizon >> config.tick_bits for horizon in config.horizons_us] if config.chooses else [longest]
     stamp = (longest + late + 1).bit_length()
-    index = (longest + late + 1) * config.ring_capacity.bit_length()
-    stamped = stamp * config.ring_capacity <= index
+    index = sum((ticks + late + 1) * held.bit_length() for ticks, held in zip(due, rings, strict=True))
+    stamped = stamp * sum(rings) <= index
     ring_entry = address + 1 + support + (stamp if stamped else 0)
     index = 0 if stamped else index
     bins = [((side - 1) >> config.bin_bits) + 1 for side in (width, height)]
@@ -121,7 +127,7 @@ def _selective_bits(config: CancelConfig, width: int, height: int, time_bits: in
         time=time_bits,
         address=address,
         ring_entry=ring_entry,
-        ring=ring_entry * config.ring_capacity + index,
+        ring=ring_entry * sum(rings) + index,
         cell=cell,
         table=cell * cells,
         cells=cells,

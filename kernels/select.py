@@ -14,18 +14,22 @@ COUNTS = ("events", "suppressed", "predicted", "outside", "overflow", "overwritt
 """What ``counts`` holds, in this order."""
 
 
-def select(*, horizons, ways, at_gate, state):
+_FARTHEST = 1 << 16  # px; a component of a shift counts for no more where shifts are compared
+
+
+def select(*, horizons, ways, at_gate, chooses, spreads, splits, state):
     """Run one launch; ``state`` holds the kernel's arguments by name, as :func:`_kernel` lists them.
 
     ``horizons``: how many; ``ways``: cells of a set, 0 for a cell for every bin; ``at_gate``: predict with the motion
-    of the time when the gate opens.
+    of the time when the gate opens; ``chooses``: each event is predicted over one horizon, from that one's own ring;
+    ``spreads``: the gate in space grows with the shift; ``splits``: OFF predictions have gates of their own.
     """
     start()
-    _kernel(horizons, ways, at_gate)(**state)
+    _kernel(horizons, ways, at_gate, chooses, spreads, splits)(**state)
 
 
 @cache
-def _kernel(horizons, ways, at_gate):
+def _kernel(horizons, ways, at_gate, chooses, spreads, splits):
     @ti.func
     def place(axis: ti.template(), rows: ti.template(), h: ti.i32, row: ti.i32, x: ti.i64, y: ti.i64) -> ti.i64:
         along = x
@@ -35,16 +39,31 @@ def _kernel(horizons, ways, at_gate):
         return ((along << 16) + first + 32768) >> 16
 
     @ti.func
+    def shift_squared(rows: ti.template(), h: ti.i32, row: ti.i32, x: ti.i64, y: ti.i64) -> ti.i64:
+        dx = ti.min(abs(place(0, rows, h, row, x, y) - x), _FARTHEST)
+        dy = ti.min(abs(place(1, rows, h, row, x, y) - y), _FARTHEST)
+        return dx * dx + dy * dy
+
+    @ti.func
+    def gate_of(off: ti.i64, on: ti.i64, sign: ti.i32) -> ti.i64:
+        gate = on
+        if ti.static(splits):
+            gate = ti.select(sign & 1 == 0, off, on)
+        return gate
+
+    @ti.func
     def cell_for(
         cell_bin: ti.template(),
         cell_time: ti.template(),
         cell_horizons: ti.template(),
+        cell_sign: ti.template(),
         bin: ti.i32,
         bins_x: ti.i32,
         set_columns: ti.i32,
         set_rows: ti.i32,
         now: ti.i64,
-        late: ti.i64,
+        off_late: ti.i64,
+        on_late: ti.i64,
         write: ti.template(),
     ) -> ti.i32:
         found = bin
@@ -57,6 +76,9 @@ def _kernel(horizons, ways, at_gate):
             oldest = base
             for w in range(ways):
                 at = base + w
+                late = on_late
+                if ti.static(splits):
+                    late = gate_of(off_late, on_late, ti.cast(cell_sign[at], ti.i32))
                 is_open = cell_horizons[at] != 0 and now <= cell_time[at] + late
                 if is_open and cell_bin[at] == bin and found < 0:
                     found = at
@@ -79,8 +101,12 @@ def _kernel(horizons, ways, at_gate):
         height: ti.i64,
         tick_bits: ti.i32,
         horizon: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [horizons] ticks, rising
-        early: ti.i64,  # ticks
-        late: ti.i64,  # ticks
+        early: ti.i64,  # ticks, the wider of the next two
+        off_early: ti.i64,  # ticks, of OFF predictions
+        on_early: ti.i64,  # ticks
+        off_late: ti.i64,  # ticks
+        on_late: ti.i64,  # ticks
+        reaches: ti.types.ndarray(dtype=ti.i32, ndim=1),  # [2] px², of the gate in space
         flip: ti.i32,  # 0 opposite, 1 equal
         blur: ti.i32,  # 1 ignores polarity
         bin_bits: ti.i32,
@@ -91,20 +117,25 @@ def _kernel(horizons, ways, at_gate):
         carry: ti.i32,
         need: ti.i32,
         least_squared: ti.i64,
+        choose_squared: ti.i64,
         offsets: ti.types.ndarray(dtype=ti.i32, ndim=2),  # [window, 2] dx dy, nearest first
+        offset_shifts: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [window] px², least shift at which each is looked at
         row_t: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [rows] µs
         rows: ti.types.ndarray(dtype=ti.i64, ndim=3),  # [horizons, rows, 6]
-        capacity: ti.i32,
+        ring_base: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [rings] first slot; one ring, or one for each horizon
+        ring_room: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [rings] slots
         t: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [n] µs
         x: ti.types.ndarray(dtype=ti.u16, ndim=1),  # [n]
         y: ti.types.ndarray(dtype=ti.u16, ndim=1),  # [n]
         p: ti.types.ndarray(dtype=ti.u8, ndim=1),  # [n]
-        ring_t: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [capacity] µs
-        ring_x: ti.types.ndarray(dtype=ti.u16, ndim=1),  # [capacity]
-        ring_y: ti.types.ndarray(dtype=ti.u16, ndim=1),  # [capacity]
-        ring_p: ti.types.ndarray(dtype=ti.u8, ndim=1),  # [capacity] polarity | support << 1
-        ring_source: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [capacity]
-        pointers: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [1 + horizons] entries stored, entries passed by each
+        ring_t: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [slots] µs
+        ring_x: ti.types.ndarray(dtype=ti.u16, ndim=1),  # [slots]
+        ring_y: ti.types.ndarray(dtype=ti.u16, ndim=1),  # [slots]
+        ring_p: ti.types.ndarray(dtype=ti.u8, ndim=1),  # [slots] polarity | support << 1
+        ring_source: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [slots]
+        stored: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [rings] entries stored
+        passed: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [horizons] entries passed by each
+        most_held: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [rings]
         cell_bin: ti.types.ndarray(dtype=ti.i32, ndim=1),  # [cells]
         cell_time: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [cells] ticks
         cell_horizons: ti.types.ndarray(dtype=ti.u8, ndim=1),  # [cells] a bit for each, 0 is empty
@@ -121,6 +152,8 @@ def _kernel(horizons, ways, at_gate):
         for _ in range(1):  # one serial task
             row_of = ti.Vector.zero(ti.i32, 5)  # the row that each pointer's entry uses, then that of the event
             many = row_t.shape[0]
+            room = ring_room[0]
+            base = ti.i64(0)
             for i in range(first, last):
                 at = t[i]
                 now = at >> tick_bits
@@ -133,12 +166,16 @@ def _kernel(horizons, ways, at_gate):
                     going = True
                     while going:
                         going = False
-                        if pointers[1 + h] < pointers[0]:
-                            slot = ti.cast(pointers[1 + h] % capacity, ti.i32)
+                        ring = ti.static(h if chooses else 0)
+                        if passed[h] < stored[ring]:
+                            if ti.static(chooses):
+                                room = ring_room[ring]
+                                base = ring_base[ring]
+                            slot = ti.cast(base + passed[h] % room, ti.i32)
                             due = (ring_t[slot] >> tick_bits) + horizon[h]
                             if due - early <= now:
                                 going = True
-                                pointers[1 + h] += 1
+                                passed[h] += 1
                                 asked = ring_t[slot]
                                 if ti.static(at_gate):
                                     asked += (horizon[h] - early) << tick_bits
@@ -154,16 +191,18 @@ def _kernel(horizons, ways, at_gate):
                                 moved = ti.i64(0)
                                 if inside:
                                     moved = (to_x - from_x) * (to_x - from_x) + (to_y - from_y) * (to_y - from_y)
-                                if inside and moved >= least_squared and due + late >= now:
+                                its_sign = ti.cast(ring_p[slot] & 1, ti.i32)
+                                timely = due + gate_of(off_late, on_late, its_sign) >= now
+                                if inside and moved >= least_squared and timely:
                                     bin = ti.cast((to_y >> bin_bits) * bins_x + (to_x >> bin_bits), ti.i32)
                                     cell = cell_for(
-                                        cell_bin, cell_time, cell_horizons, bin, bins_x, set_columns, set_rows,
-                                        now, late, True,
+                                        cell_bin, cell_time, cell_horizons, cell_sign, bin, bins_x,
+                                        set_columns, set_rows, now, off_late, on_late, True,
                                     )  # fmt: skip
-                                    is_open = cell_horizons[cell] != 0 and now <= cell_time[cell] + late
-                                    its_sign = ti.cast(ring_p[slot] & 1, ti.i32)
                                     support = ti.cast(ring_p[slot] >> 1, ti.i32)
                                     old_sign = ti.cast(cell_sign[cell] & 1, ti.i32)
+                                    late = gate_of(off_late, on_late, old_sign)
+                                    is_open = cell_horizons[cell] != 0 and now <= cell_time[cell] + late
                                     if is_open and cell_bin[cell] == bin and old_sign == its_sign:
                                         held = ti.cast(cell_horizons[cell], ti.i32)
                                         if (held >> h) & 1 == 0:
@@ -185,7 +224,17 @@ def _kernel(horizons, ways, at_gate):
                                     cell_source[cell] = ring_source[slot]
                                     cell_last[cell] = ti.u8(h)
 
+                # The row of the event's own time
+                if ti.static(spreads or not at_gate):
+                    k = row_of[4]
+                    while k + 1 < many and row_t[k + 1] <= at:
+                        k += 1
+                    row_of[4] = k
+
                 # 2. match
+                shift = ti.i64(0)
+                if ti.static(spreads):
+                    shift = shift_squared(rows, 0, row_of[4], column, line)
                 nearest = -1
                 votes = 0
                 carried = 0
@@ -193,7 +242,11 @@ def _kernel(horizons, ways, at_gate):
                 for o in range(offsets.shape[0]):
                     beside_x = ti.cast(column, ti.i32) + offsets[o, 0]
                     beside_y = ti.cast(line, ti.i32) + offsets[o, 1]
-                    if searching and beside_x >= 0 and beside_y >= 0 and beside_x < width and beside_y < height:
+                    near = True
+                    if ti.static(spreads):
+                        near = shift >= offset_shifts[o]
+                    there = beside_x >= 0 and beside_y >= 0 and beside_x < width and beside_y < height
+                    if searching and near and there:
                         bin = (beside_y >> bin_bits) * bins_x + (beside_x >> bin_bits)
                         fresh = True
                         if bin_bits > 0:
@@ -201,18 +254,24 @@ def _kernel(horizons, ways, at_gate):
                             for q in range(o):
                                 other_x = ti.cast(column, ti.i32) + offsets[q, 0]
                                 other_y = ti.cast(line, ti.i32) + offsets[q, 1]
-                                there = other_x >= 0 and other_y >= 0 and other_x < width and other_y < height
-                                if there and (other_y >> bin_bits) * bins_x + (other_x >> bin_bits) == bin:
+                                within = other_x >= 0 and other_y >= 0 and other_x < width and other_y < height
+                                if within and (other_y >> bin_bits) * bins_x + (other_x >> bin_bits) == bin:
                                     fresh = False
                         if fresh:
                             cell = cell_for(
-                                cell_bin, cell_time, cell_horizons, bin, bins_x, set_columns, set_rows,
-                                now, late, False,
+                                cell_bin, cell_time, cell_horizons, cell_sign, bin, bins_x,
+                                set_columns, set_rows, now, off_late, on_late, False,
                             )  # fmt: skip
                             if cell >= 0:
                                 held = ti.cast(cell_horizons[cell], ti.i32)
-                                passes = blur == 1 or ti.cast(cell_sign[cell] & 1, ti.i32) == (sign ^ flip)
-                                timely = now <= cell_time[cell] + late and now >= cell_time[cell] - early
+                                old_sign = ti.cast(cell_sign[cell] & 1, ti.i32)
+                                passes = blur == 1 or old_sign == (sign ^ flip)
+                                since = now - cell_time[cell]
+                                timely = since <= gate_of(off_late, on_late, old_sign)
+                                timely = timely and since >= -gate_of(off_early, on_early, old_sign)
+                                if ti.static(splits):
+                                    far = offsets[o, 0] * offsets[o, 0] + offsets[o, 1] * offsets[o, 1]
+                                    passes = passes and far <= reaches[old_sign]
                                 if held != 0 and timely and passes:
                                     if nearest < 0:
                                         nearest = cell
@@ -238,36 +297,48 @@ def _kernel(horizons, ways, at_gate):
                 # 3. remember
                 made = ti.static(1 if at_gate else 0) + 0 * sign
                 beyond = False
+                ring = 0
+                if ti.static(chooses):
+                    # From the longest down, so that the shortest that is far enough stays.
+                    ring = horizons - 1
+                    for back in ti.static(range(2, horizons + 1)):
+                        if shift_squared(rows, horizons - back, row_of[4], column, line) >= choose_squared:
+                            ring = horizons - back
+                    room = ring_room[ring]
+                    base = ring_base[ring]
                 if ti.static(not at_gate):
-                    k = row_of[4]
-                    while k + 1 < many and row_t[k + 1] <= at:
-                        k += 1
-                    row_of[4] = k
                     for h in ti.static(range(horizons)):
-                        to_x = place(0, rows, h, k, column, line)
-                        to_y = place(1, rows, h, k, column, line)
-                        if to_x >= 0 and to_x < width and to_y >= 0 and to_y < height:
-                            if (to_x - column) * (to_x - column) + (to_y - line) * (to_y - line) >= least_squared:
-                                made = 1
-                        else:
-                            beyond = True
+                        if ti.static(not chooses) or ring == h:
+                            to_x = place(0, rows, h, row_of[4], column, line)
+                            to_y = place(1, rows, h, row_of[4], column, line)
+                            if to_x >= 0 and to_x < width and to_y >= 0 and to_y < height:
+                                if (to_x - column) * (to_x - column) + (to_y - line) * (to_y - line) >= least_squared:
+                                    made = 1
+                            else:
+                                beyond = True
                 if made == 0:
                     if beyond:
                         counts[3] += 1
                     else:
                         counts[7] += 1
-                elif pointers[0] - pointers[horizons] == capacity:
+                elif stored[ring] - passed[ti.static(0 if chooses else horizons - 1) + ring] == room:
                     counts[4] += 1
                 else:
-                    slot = ti.cast(pointers[0] % capacity, ti.i32)
+                    slot = ti.cast(base + stored[ring] % room, ti.i32)
                     ring_t[slot] = at
                     ring_x[slot] = x[i]
                     ring_y[slot] = y[i]
                     ring_p[slot] = ti.cast(sign | (ti.min(support, carry) << 1), ti.u8)
                     ring_source[slot] = counts[0]
-                    pointers[0] += 1
+                    stored[ring] += 1
                     counts[2] += 1
-                    counts[6] = ti.max(counts[6], pointers[0] - pointers[horizons])
+                    held = stored[ring] - passed[ti.static(0 if chooses else horizons - 1) + ring]
+                    most_held[ring] = ti.max(most_held[ring], held)
+                    if ti.static(chooses):
+                        for h in ti.static(range(horizons)):
+                            if ring != h:
+                                held += stored[h] - passed[h]
+                    counts[6] = ti.max(counts[6], held)
                 counts[0] += 1
 
     return run

@@ -72,6 +72,8 @@ def test_bits_of_a_selective_configuration_by_hand() -> None:
         ({"more_horizons_us": (900, 950)}, 18 + 11, 8 + 4, 320 * 240),
         ({"early_us": 0}, 18 + 10, 7 + 2, 320 * 240),
         ({"bin_bits": 2}, 18 + 10, 8 + 2, 80 * 60),
+        ({"off_late_us": 300}, 18 + 10, 9 + 2, 320 * 240),  # 100 + 300 + 1 ticks, and a quarter
+        ({"spread_us": 30, "spread_px": 1.0}, 18 + 10, 8 + 2, 320 * 240),
         ({"set_bits": (3, 12), "ways": 2}, 18 + 10, 8 + 2 + 6, 2 << 15),  # rows are told by the set alone
     ],
 )
@@ -81,6 +83,15 @@ def test_each_parameter_costs_its_bits(changed: dict[str, Any], entry: int, cell
     assert (state.ring_entry, state.cell, state.cells) == (entry, cell, cells)
     assert (state.ring, state.table) == (entry * 50 + state.index, cell * cells)
     assert state.index == 0  # so short a ring stamps its entries
+
+
+def test_each_horizon_has_a_ring_of_its_own_where_events_choose() -> None:
+    table: dict[str, Any] = {"horizon_us": 500, "more_horizons_us": (900,), "tolerance_us": 100, "choose_px": 4.0}
+    state = state_bits(CancelConfig(**table, ring_capacity=50, more_ring_capacities=(30,)), width=320, height=240)
+    assert (state.ring_entry, state.ring, state.index) == (18 + 10, (18 + 10) * 80, 0)
+    long = state_bits(CancelConfig(**table, ring_capacity=5000, more_ring_capacities=(2000,)), width=320, height=240)
+    assert long.index == (500 + 100 + 1) * 13 + (900 + 100 + 1) * 11
+    assert (long.ring_entry, long.ring) == (18, 18 * 7000 + long.index)
 
 
 def test_stamps_no_wider_than_their_gate_are_refused() -> None:
@@ -97,27 +108,29 @@ class NarrowStamps(SelectiveOracle):
         self._modulus, self._sweep_ticks = 1 << time_bits, sweep_ticks
         self._clock: int | None = None
 
-    def _left(self, cell: Any, now: int) -> int:
-        return int((cell.due - now + self._late) % self._modulus)
+    def _left(self, cell: Any, now: int, late: int) -> int:
+        return int((cell.due - now + late) % self._modulus)
 
     def _is_open(self, cell: Any, now: int) -> bool:
-        return bool(cell.horizons) and self._left(cell, now) <= self._early + self._late
+        late = self._late[cell.p]
+        return bool(cell.horizons) and self._left(cell, now, late) <= max(self._early) + late
 
     def _passes(self, cell: Any, now: int, p: int) -> bool:
+        late = self._late[cell.p]
+        if self._left(cell, now, late) > self._early[cell.p] + late:
+            return False
         return self.config.polarity == "ignore" or (cell.p == p) == (self.config.polarity == "opposite")
 
     def _cell_for(self, at: Any, now: int) -> Any:
         first = super()._cell_for(at, now)
         ways = self._table[self._set_of(at)]
         if self._is_open(first, now) and first.bin != at:
-            return min(ways, key=lambda cell: self._left(cell, now))
+            return min(ways, key=lambda cell: self._left(cell, now, max(self._late)))
         return first
 
     def _write(self, at: Any, h: int, due: int, entry: Any, now: int) -> None:
         cell = self._cell_for(at, now)
         super()._write(at, h, due, entry, now)
-        if due + self._late < now:
-            cell.horizons = set()
         cell.due = due % self._modulus
 
     def _drain(self, maps: Any, h: int, now: int) -> None:
@@ -138,6 +151,8 @@ def crowd(seed: int) -> tuple[CancelConfig, Events]:
         more_horizons_us=(13,),
         early_us=int(rng.integers(0, 4)),
         late_us=int(rng.integers(0, 4)),
+        off_early_us=int(rng.integers(0, 4)) if rng.random() < 0.5 else None,
+        off_late_us=int(rng.integers(0, 4)) if rng.random() < 0.5 else None,
         uses=int(rng.integers(0, 3)),
         carry=3,
         need=int(rng.integers(1, 4)),

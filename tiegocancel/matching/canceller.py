@@ -143,6 +143,11 @@ class Canceller:
         """Number of predictions in the ring."""
         return int(self._cursors[1]) if self._engine is None else self._engine.pending
 
+    @property
+    def most_held(self) -> tuple[int, ...]:
+        """Most that each ring ever held: of the one ring, or of each horizon's own where events choose among them."""
+        return (self.counters.ring_high_water,) if self._engine is None else self._engine.most_held
+
     def prepare(self) -> None:
         """Compile the kernel now instead of at the first event; it decides nothing."""
         one = Events([0], [0], [0], [0], self.width, self.height)  # type: ignore[arg-type]

@@ -19,6 +19,10 @@ MAX_GATE_US = (1 << 28) - 1
 MAX_TOLERANCE_PX = 64.0
 MAX_RING_CAPACITY = 1 << 28
 MAX_HORIZONS = 4
+MAX_SHIFT_PX = 1 << 16
+"""A component of a shift counts for no more than this where shifts are compared."""
+
+_NO_SHIFT_SQUARED = 1 << 34
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,6 +42,11 @@ class CancelConfig:
       ``2^(columns + rows)`` sets of ``ways`` cells instead of one cell for every bin.
     - ``least_shift_px``: a prediction nearer than this to its event is not made.
     - ``motion_at``: predict with the motion of the ``event``'s time, or with that of the time when the ``gate`` opens.
+    - ``choose_px``: predict each event over one horizon alone, the shortest that moves it so far, and give each horizon
+      a ring of its own; 0 predicts over all. ``more_ring_capacities``: of the further horizons' rings, else all alike.
+    - ``spread_us`` and ``spread_px``: the gate in space grows with speed, ``spread_px + speed · spread_us``, up to
+      ``tolerance_px`` (thesis, eq. 5.5); both 0: it is ``tolerance_px`` everywhere.
+    - ``off_early_us``, ``off_late_us`` and ``off_tolerance_px``: gates of OFF predictions, those of ON unless given.
 
     Raise ``ValueError`` with field, rule and value.
     """
@@ -59,6 +68,13 @@ class CancelConfig:
     ways: int = 8
     least_shift_px: float = 0.0
     motion_at: Literal["event", "gate"] = "event"
+    choose_px: float = 0.0
+    more_ring_capacities: tuple[int, ...] = ()
+    spread_us: int = 0
+    spread_px: float = 0.0
+    off_early_us: int | None = None
+    off_late_us: int | None = None
+    off_tolerance_px: float | None = None
 
     def __post_init__(self) -> None:
         for name, low, high in (
@@ -70,13 +86,15 @@ class CancelConfig:
             ("tick_bits", 0, 16),
             ("bin_bits", 0, 4),
             ("ways", 1, 64),
+            ("spread_us", 0, MAX_GATE_US),
         ):
             object.__setattr__(self, name, _whole(name, getattr(self, name), low, high))
-        for name in ("early_us", "late_us"):
+        for name in ("early_us", "late_us", "off_early_us", "off_late_us"):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, _whole(name, getattr(self, name), 0, MAX_GATE_US))
-        for name in ("tolerance_px", "least_shift_px"):
-            object.__setattr__(self, name, _distance(name, getattr(self, name)))
+        for name in ("tolerance_px", "least_shift_px", "choose_px", "spread_px", "off_tolerance_px"):
+            if name != "off_tolerance_px" or self.off_tolerance_px is not None:
+                object.__setattr__(self, name, _distance(name, getattr(self, name)))
         if self.polarity not in ("opposite", "equal", "ignore"):
             raise ValueError(f"polarity must be 'opposite', 'equal' or 'ignore', not {self.polarity!r}")
         if self.motion_at not in ("event", "gate"):
@@ -85,6 +103,7 @@ class CancelConfig:
         object.__setattr__(self, "more_horizons_us", more)
         if len(more) >= MAX_HORIZONS or any(b <= a for a, b in pairwise(self.horizons_us)):
             raise ValueError(f"more_horizons_us must be at most 3, rising from horizon_us, not {list(more)}")
+        self._check_choice()
         object.__setattr__(self, "need", _whole("need", self.need, 1, len(more) + 1 + self.carry))
         if self.set_bits is not None:
             if len(self.set_bits) != 2:
@@ -97,8 +116,8 @@ class CancelConfig:
             )
         for name, value in (
             *(("horizon_us", horizon) for horizon in self.horizons_us),
-            ("early_us", self.early_gate_us),
-            ("late_us", self.late_gate_us),
+            *zip(("early_us", "off_early_us"), reversed(self.early_gates_us), strict=True),
+            *zip(("late_us", "off_late_us"), reversed(self.late_gates_us), strict=True),
         ):
             if value % tick:
                 near = value // tick * tick
@@ -106,20 +125,60 @@ class CancelConfig:
                     f"{name} must be whole ticks of {tick} µs (tick_bits): {near} or {near + tick}, not {value}"
                 )
 
+    def _check_choice(self) -> None:
+        """Refuse a choice among horizons that cannot be made, and capacities that nothing asks for."""
+        capacities = tuple(
+            _whole("more_ring_capacities", value, 1, MAX_RING_CAPACITY) for value in self.more_ring_capacities
+        )
+        object.__setattr__(self, "more_ring_capacities", capacities)
+        if self.chooses and not self.more_horizons_us:
+            raise ValueError(f"choose_px needs more_horizons_us to choose from, and must be 0, not {self.choose_px:g}")
+        if self.chooses and self.motion_at == "gate":
+            raise ValueError("choose_px needs motion_at = 'event': the choice is made when the event is stored")
+        if capacities and (not self.chooses or len(capacities) != len(self.more_horizons_us)):
+            raise ValueError(
+                "more_ring_capacities must be one for each of more_horizons_us, under choose_px, "
+                f"not {list(capacities)}"
+            )
+
     @property
     def horizons_us(self) -> tuple[int, ...]:
         """All horizons, rising."""
         return (self.horizon_us, *self.more_horizons_us)
 
     @property
+    def chooses(self) -> bool:
+        """Tell whether each event is predicted over one horizon of several alone."""
+        return self.choose_squared_px > 0
+
+    @property
+    def ring_capacities(self) -> tuple[int, ...]:
+        """Capacity of each ring: of the one that all horizons share, or of each horizon's own where events choose."""
+        if not self.chooses:
+            return (self.ring_capacity,)
+        return (self.ring_capacity, *(self.more_ring_capacities or (self.ring_capacity,) * len(self.more_horizons_us)))
+
+    @property
+    def early_gates_us(self) -> tuple[int, int]:
+        """How long before its predicted time an event may come, inclusive: of OFF and of ON predictions."""
+        on = self.tolerance_us if self.early_us is None else self.early_us
+        return on if self.off_early_us is None else self.off_early_us, on
+
+    @property
+    def late_gates_us(self) -> tuple[int, int]:
+        """How long after its predicted time an event may come, inclusive: of OFF and of ON predictions."""
+        on = self.tolerance_us if self.late_us is None else self.late_us
+        return on if self.off_late_us is None else self.off_late_us, on
+
+    @property
     def early_gate_us(self) -> int:
-        """How long before its predicted time an event may come, inclusive."""
-        return self.tolerance_us if self.early_us is None else self.early_us
+        """The wider early gate: so long before its time a prediction moves to its cell."""
+        return max(self.early_gates_us)
 
     @property
     def late_gate_us(self) -> int:
-        """How long after its predicted time an event may come, inclusive."""
-        return self.tolerance_us if self.late_us is None else self.late_us
+        """The wider late gate."""
+        return max(self.late_gates_us)
 
     @property
     def is_plain(self) -> bool:
@@ -127,16 +186,52 @@ class CancelConfig:
         return (
             not self.more_horizons_us
             and (self.carry, self.need, self.uses, self.tick_bits, self.bin_bits) == (0, 1, 1, 0, 0)
-            and (self.early_gate_us, self.late_gate_us) == (self.tolerance_us, self.tolerance_us)
+            and {*self.early_gates_us, *self.late_gates_us} == {self.tolerance_us}
+            and self.reaches_squared_px[0] == self.reaches_squared_px[1]
+            and not self.spreads
             and self.set_bits is None
             and self.least_shift_squared_px == 0
             and self.motion_at == "event"
         )
 
     @property
+    def reaches_squared_px(self) -> tuple[int, int]:
+        """Largest ``dx² + dy²`` inside the spatial gate of OFF and of ON; the slack lets ``sqrt(13)`` reach 13."""
+        off_px = self.tolerance_px if self.off_tolerance_px is None else self.off_tolerance_px
+        return math.floor(float(off_px) ** 2 + 1e-9), math.floor(float(self.tolerance_px) ** 2 + 1e-9)
+
+    @property
     def reach_squared_px(self) -> int:
-        """Largest ``dx² + dy²`` inside the spatial gate; the slack lets ``sqrt(13)`` reach 13."""
-        return math.floor(float(self.tolerance_px) ** 2 + 1e-9)
+        """Largest ``dx² + dy²`` that is looked at, the wider of the two gates."""
+        return max(self.reaches_squared_px)
+
+    @property
+    def choose_squared_px(self) -> int:
+        """Least ``dx² + dy²`` that makes a horizon the chosen one."""
+        return math.ceil(float(self.choose_px) ** 2 - 1e-9)
+
+    @property
+    def spreads(self) -> bool:
+        """Tell whether the gate in space grows with speed."""
+        return self.spread_us > 0 or self.spread_px > 0
+
+    @property
+    def spread_shifts_squared(self) -> tuple[int, ...]:
+        """Least squared shift over the shortest horizon at which each of ``offsets`` is looked at.
+
+        The gate is ``spread_px + shift · spread_us / horizon_us``, so that an offset ``d`` away needs a shift of
+        ``(d − spread_px) · horizon_us / spread_us``, squared and rounded up to a whole number; where that is beyond
+        any shift, ``2^34``.
+        """
+        least = []
+        for dx, dy in self.offsets:
+            beyond_px = math.hypot(dx, dy) - self.spread_px - 1e-9
+            if not self.spreads or beyond_px <= 0:
+                least.append(0)
+            else:
+                needed_px = beyond_px * self.horizon_us / self.spread_us if self.spread_us else math.inf
+                least.append(math.ceil(min(needed_px**2, _NO_SHIFT_SQUARED)))
+        return tuple(least)
 
     @property
     def least_shift_squared_px(self) -> int:
@@ -159,7 +254,8 @@ class CancelConfig:
 
         The longest horizon and the late gate, as many times as support must be carried on to reach ``need``.
         """
-        rounds = max(self.need - len(self.horizons_us) + 1, 1) if self.carry else 1
+        agreeing = 1 if self.chooses else len(self.horizons_us)
+        rounds = max(self.need - agreeing + 1, 1) if self.carry else 1
         return self.horizons_us[-1] * rounds + self.late_gate_us
 
 

@@ -55,6 +55,11 @@ class OracleCanceller:
         """Number of predictions in the ring."""
         return len(self._ring) if self._selective is None else self._selective.pending
 
+    @property
+    def most_held(self) -> tuple[int, ...]:
+        """Most entries that each ring ever held."""
+        return (self._counts["ring_high_water"],) if self._selective is None else self._selective.most_held
+
     def process(self, events: Events) -> Decisions:
         """Decide every event of a chunk; chunks may be cut anywhere."""
         if self._selective is not None:

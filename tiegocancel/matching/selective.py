@@ -49,17 +49,31 @@ class SelectiveEngine:
         cells = bins_x * bins_y if ways == 0 else ways << (columns + rows)
         if cells >= 1 << 31:
             raise ValueError(f"a table of {cells} cells for {width}×{height} px is beyond 2^31")
-        capacity = config.ring_capacity
+        rings = np.array(config.ring_capacities, np.int64)
+        capacity = int(rings.sum())
         self.counts: NDArray[np.int64] = np.zeros(8, np.int64)
-        self._pointers = np.zeros(1 + horizons, np.int64)
-        self._options = {"horizons": horizons, "ways": ways, "at_gate": config.motion_at == "gate"}
+        self._stored, self._passed = np.zeros(len(rings), np.int64), np.zeros(horizons, np.int64)
+        gates = zip(config.early_gates_us, config.late_gates_us, config.reaches_squared_px, strict=True)
+        self._options = {
+            "horizons": horizons,
+            "ways": ways,
+            "at_gate": config.motion_at == "gate",
+            "chooses": config.chooses,
+            "spreads": config.spreads,
+            "splits": len({*gates}) > 1,
+        }
         self._state: dict[str, Any] = {
             "width": width,
             "height": height,
             "tick_bits": tick,
             "horizon": np.array([horizon >> tick for horizon in config.horizons_us], np.int64),
             "early": config.early_gate_us >> tick,
-            "late": config.late_gate_us >> tick,
+            **{
+                f"{name}_{side}": gate >> tick
+                for side, gates in (("early", config.early_gates_us), ("late", config.late_gates_us))
+                for name, gate in zip(("off", "on"), gates, strict=True)
+            },
+            "reaches": np.array(config.reaches_squared_px, np.int32),
             "flip": int(config.polarity == "equal"),
             "blur": int(config.polarity == "ignore"),
             "bin_bits": config.bin_bits,
@@ -70,14 +84,19 @@ class SelectiveEngine:
             "carry": config.carry,
             "need": config.need,
             "least_squared": config.least_shift_squared_px,
+            "choose_squared": config.choose_squared_px,
             "offsets": np.array(config.offsets, np.int32),
-            "capacity": capacity,
+            "offset_shifts": np.array(config.spread_shifts_squared, np.int64),
+            "ring_base": np.concatenate([[0], np.cumsum(rings)[:-1]]),
+            "ring_room": rings,
             "ring_t": np.zeros(capacity, np.int64),
             "ring_x": np.zeros(capacity, np.uint16),
             "ring_y": np.zeros(capacity, np.uint16),
             "ring_p": np.zeros(capacity, np.uint8),
             "ring_source": np.zeros(capacity, np.int64),
-            "pointers": self._pointers,
+            "stored": self._stored,
+            "passed": self._passed,
+            "most_held": np.zeros(len(rings), np.int64),
             "cell_bin": np.zeros(cells, np.int32),
             "cell_time": np.zeros(cells, np.int64),
             "cell_horizons": np.zeros(cells, np.uint8),
@@ -90,8 +109,13 @@ class SelectiveEngine:
 
     @property
     def pending(self) -> int:
-        """Number of entries in the ring."""
-        return int(self._pointers[0] - self._pointers[-1])
+        """Number of entries in the rings."""
+        return int((self._stored - self._passed[-len(self._stored) :]).sum())
+
+    @property
+    def most_held(self) -> tuple[int, ...]:
+        """Most entries that each ring ever held."""
+        return tuple(int(count) for count in self._state["most_held"])
 
     def run(
         self, events: Events, schedules: Schedules

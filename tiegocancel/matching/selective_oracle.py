@@ -9,7 +9,7 @@ import numpy as np
 from tiegocancel.events import Events
 from tiegocancel.matching.ahead import ahead
 from tiegocancel.matching.canceller import Counters, Decisions
-from tiegocancel.matching.config import CancelConfig
+from tiegocancel.matching.config import MAX_SHIFT_PX, CancelConfig
 from tiegocancel.matching.selective import Schedules, schedules_for
 from tiegocancel.motion.schedule import MotionSchedule
 from tiegocancel.motion.trajectory import Trajectory
@@ -21,7 +21,7 @@ Bin = tuple[int, int]
 
 @dataclass(slots=True, frozen=True)
 class _Entry:
-    """Remember event ``index`` until its prediction for the longest horizon has fallen due."""
+    """Remember event ``index`` until its last prediction has fallen due."""
 
     t_us: int
     x: int
@@ -56,11 +56,14 @@ class SelectiveOracle:
     ) -> None:
         self.config, self.motion, self.width, self.height = config, motion, width, height
         self._horizons = [horizon >> config.tick_bits for horizon in config.horizons_us]
-        self._early = config.early_gate_us >> config.tick_bits
-        self._late = config.late_gate_us >> config.tick_bits
-        self._ring: dict[int, _Entry] = {}  # by the number under which it was stored
-        self._stored = 0
+        self._early, self._late = (
+            [gate >> config.tick_bits for gate in gates] for gates in (config.early_gates_us, config.late_gates_us)
+        )  # of OFF and of ON predictions
+        # Every ring by the numbers under which its entries were stored; one ring unless events choose among horizons.
+        self._rings: list[dict[int, _Entry]] = [{} for _ in config.ring_capacities]
+        self._stored = [0] * len(self._rings)
         self._passed = [0] * len(self._horizons)
+        self._held = [0] * len(self._rings)
         self._table: dict[Bin, list[_Cell]] = {}  # the ways of each set; without sets, one way for each bin
         self._counts = dict(Counters())
 
@@ -71,8 +74,13 @@ class SelectiveOracle:
 
     @property
     def pending(self) -> int:
-        """Number of entries in the ring."""
-        return len(self._ring)
+        """Number of entries in the rings."""
+        return sum(len(ring) for ring in self._rings)
+
+    @property
+    def most_held(self) -> tuple[int, ...]:
+        """Most entries that each ring ever held."""
+        return tuple(self._held)
 
     def process(self, events: Events) -> Decisions:
         """Decide every event of a chunk; chunks may be cut anywhere."""
@@ -85,7 +93,7 @@ class SelectiveOracle:
             now = t >> self.config.tick_bits
             for h in range(len(self._horizons)):
                 self._drain(maps, h, now)
-            first, support = self._match(now, x, y, p)
+            first, support = self._match(maps, t, x, y, p)
             if first is not None and support >= self.config.need:
                 suppressed[i], source[i], horizon[i] = True, first.source, first.last
                 self._use(first)
@@ -96,16 +104,18 @@ class SelectiveOracle:
 
     def _drain(self, maps: tuple[MotionSchedule | Trajectory, ...], h: int, now: int) -> None:
         """Move every prediction of horizon ``h`` whose gate has opened to its cell; pass those that are not made."""
-        while self._passed[h] < self._stored:
-            entry = self._ring[self._passed[h]]
+        which = h if self.config.chooses else 0
+        ring = self._rings[which]
+        while self._passed[h] < self._stored[which]:
+            entry = ring[self._passed[h]]
             due = (entry.t_us >> self.config.tick_bits) + self._horizons[h]
-            if due - self._early > now:
+            if due - max(self._early) > now:
                 return
-            if h == len(self._horizons) - 1:
-                del self._ring[self._passed[h]]
+            if self.config.chooses or h == len(self._horizons) - 1:
+                del ring[self._passed[h]]
             self._passed[h] += 1
             at, _ = self._place(maps, h, entry)
-            if at is not None and due + self._late >= now:
+            if at is not None and due + self._late[entry.p] >= now:
                 self._write(at, h, due, entry, now)
 
     def _write(self, at: Bin, h: int, due: int, entry: _Entry, now: int) -> None:
@@ -125,9 +135,17 @@ class SelectiveOracle:
             cell.bin, cell.p, cell.horizons, cell.uses, cell.support = at, entry.p, {h}, 1, entry.support
         cell.due, cell.source, cell.last = due, entry.index, h
 
-    def _match(self, now: int, x: int, y: int, p: int) -> tuple[_Cell | None, int]:
+    def _match(
+        self, maps: tuple[MotionSchedule | Trajectory, ...], t_us: int, x: int, y: int, p: int
+    ) -> tuple[_Cell | None, int]:
         """Return the nearest candidate and the support of all of them together."""
-        candidates = [cell for cell in self._cells_near(x, y, now) if self._passes(cell, now, p)]
+        now = t_us >> self.config.tick_bits
+        shift = self._shift_squared(maps, 0, t_us, x, y) if self.config.spreads else 0
+        candidates = [
+            cell
+            for cell, squared in self._cells_near(x, y, now, shift)
+            if self._passes(cell, now, p) and squared <= self.config.reaches_squared_px[cell.p]
+        ]
         if not candidates:
             return None, 0
         votes = set().union(*(cell.horizons for cell in candidates))
@@ -142,18 +160,36 @@ class SelectiveOracle:
 
     def _remember(self, maps: tuple[MotionSchedule | Trajectory, ...], entry: _Entry) -> None:
         """Store the event, unless its motion gives no prediction or the ring is full."""
+        horizons, which = range(len(self._horizons)), 0
+        if self.config.chooses:
+            which = self._chosen(maps, entry)
+            horizons = range(which, which + 1)
         if self.config.motion_at == "event":
-            places = [self._place(maps, h, entry) for h in range(len(self._horizons))]
+            places = [self._place(maps, h, entry) for h in horizons]
             if all(at is None for at, _ in places):
                 self._counts["outside" if any(beyond for _, beyond in places) else "still"] += 1
                 return
-        if len(self._ring) == self.config.ring_capacity:
+        ring = self._rings[which]
+        if len(ring) == self.config.ring_capacities[which]:
             self._counts["overflow"] += 1
             return
-        self._ring[self._stored] = entry
-        self._stored += 1
+        ring[self._stored[which]] = entry
+        self._stored[which] += 1
+        self._held[which] = max(self._held[which], len(ring))
         self._counts["predicted"] += 1
-        self._counts["ring_high_water"] = max(self._counts["ring_high_water"], len(self._ring))
+        self._counts["ring_high_water"] = max(self._counts["ring_high_water"], self.pending)
+
+    def _chosen(self, maps: tuple[MotionSchedule | Trajectory, ...], entry: _Entry) -> int:
+        """Return the shortest horizon that moves the event far enough, the longest where none does."""
+        for h in range(len(self._horizons) - 1):
+            if self._shift_squared(maps, h, entry.t_us, entry.x, entry.y) >= self.config.choose_squared_px:
+                return h
+        return len(self._horizons) - 1
+
+    def _shift_squared(self, maps: tuple[MotionSchedule | Trajectory, ...], h: int, t_us: int, x: int, y: int) -> int:
+        """Return the squared shift over horizon ``h`` by the motion of ``t_us``, on the sensor or beyond."""
+        to_x, to_y = ahead(maps[h], t_us, x, y, self.config.horizons_us[h])
+        return min(abs(to_x - x), MAX_SHIFT_PX) ** 2 + min(abs(to_y - y), MAX_SHIFT_PX) ** 2
 
     def _place(self, maps: tuple[MotionSchedule | Trajectory, ...], h: int, entry: _Entry) -> tuple[Bin | None, bool]:
         """Return the bin of the prediction for horizon ``h``, ``None`` if not made, and whether it lies outside."""
@@ -166,30 +202,33 @@ class SelectiveOracle:
             return None, False
         return (x >> self.config.bin_bits, y >> self.config.bin_bits), False
 
-    def _cells_near(self, x: int, y: int, now: int) -> list[_Cell]:
-        """Return the open cells of the bins in the window, nearest first, each once."""
-        window = [(x + dx, y + dy) for dx, dy in self.config.offsets]
-        bins = dict.fromkeys(
-            (column >> self.config.bin_bits, row >> self.config.bin_bits)
-            for column, row in window
-            if 0 <= column < self.width and 0 <= row < self.height
-        )
+    def _cells_near(self, x: int, y: int, now: int, shift: int) -> list[tuple[_Cell, int]]:
+        """Return the open cells of the bins in the window of an event that moves so far, nearest first, each once.
+
+        Beside each stands the squared distance of its bin's nearest pixel.
+        """
+        bins: dict[Bin, int] = {}
+        for (dx, dy), least in zip(self.config.offsets, self.config.spread_shifts_squared, strict=True):
+            column, row = x + dx, y + dy
+            if 0 <= column < self.width and 0 <= row < self.height and shift >= least:
+                at = (column >> self.config.bin_bits, row >> self.config.bin_bits)
+                bins.setdefault(at, dx * dx + dy * dy)
         return [
-            cell
-            for at in bins
+            (cell, squared)
+            for at, squared in bins.items()
             for cell in self._table.get(self._set_of(at), ())
             if cell.bin == at and self._is_open(cell, now)
         ]
 
     def _passes(self, cell: _Cell, now: int, p: int) -> bool:
         """Tell whether an event of polarity ``p`` may meet an open cell."""
-        if now < cell.due - self._early:
+        if now < cell.due - self._early[cell.p]:
             return False
         return self.config.polarity == "ignore" or (cell.p == p) == (self.config.polarity == "opposite")
 
     def _is_open(self, cell: _Cell, now: int) -> bool:
         """Tell whether events can still meet a cell."""
-        return bool(cell.horizons) and now <= cell.due + self._late
+        return bool(cell.horizons) and now <= cell.due + self._late[cell.p]
 
     def _cell_for(self, at: Bin, now: int) -> _Cell:
         """Return the cell to write: the open one of this bin, else the first not open, else the one due first."""

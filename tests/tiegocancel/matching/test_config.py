@@ -47,6 +47,26 @@ from tiegocancel.matching.config import CancelConfig
             "horizon_us must be whole ticks of 512 µs (tick_bits): 7680 or 8192, not 8000",
         ),
         ({"tick_bits": 4}, "early_us must be whole ticks of 16 µs (tick_bits): 992 or 1008, not 1000"),
+        ({"choose_px": 4}, "choose_px needs more_horizons_us to choose from, and must be 0, not 4"),
+        ({"choose_px": 4, "more_horizons_us": (9000,), "motion_at": "gate"}, "choose_px needs motion_at = 'event'"),
+        ({"more_ring_capacities": (5,)}, "more_ring_capacities must be one for each of more_horizons_us, under choose"),
+        (
+            {"choose_px": 4, "more_horizons_us": (9000,), "more_ring_capacities": (5, 6)},
+            "more_ring_capacities must be one for each of more_horizons_us, under choose_px, not [5, 6]",
+        ),
+        (
+            {"choose_px": 4, "more_horizons_us": (9000,), "more_ring_capacities": (0,)},
+            "more_ring_capacities must be an integer from 1 to 268435456, not 0",
+        ),
+        ({"spread_us": -1}, "spread_us must be an integer from 0 to 268435455, not -1"),
+        ({"spread_px": "1"}, "spread_px must be a number from 0 to 64, not '1'"),
+        ({"off_tolerance_px": 65}, "off_tolerance_px must be a number from 0 to 64, not 65"),
+        ({"off_late_us": 0.5}, "off_late_us must be an integer from 0 to 268435455, not 0.5"),
+        ({"off_early_us": 8000}, "early_us must be below horizon_us when the canceller is selective, not 8000"),
+        (
+            {"horizon_us": 8192, "tick_bits": 4, "tolerance_us": 16, "off_late_us": 20},
+            "off_late_us must be whole ticks of 16 µs (tick_bits): 16 or 32, not 20",
+        ),
         ({"tick_bits": 4, "early_us": 16}, "late_us must be whole ticks of 16 µs (tick_bits): 992 or 1008, not 1000"),
     ],
 )
@@ -74,6 +94,11 @@ def test_the_plain_rule_may_open_its_gate_before_its_event() -> None:
         {"set_bits": (0, 0)},
         {"least_shift_px": 0.5},
         {"motion_at": "gate"},
+        {"spread_us": 5},
+        {"spread_px": 1.0},
+        {"off_early_us": 999},
+        {"off_late_us": 0},
+        {"off_tolerance_px": 1.0},
     ],
 )
 def test_each_parameter_leaves_the_plain_rule(table: dict[str, Any]) -> None:
@@ -82,6 +107,32 @@ def test_each_parameter_leaves_the_plain_rule(table: dict[str, Any]) -> None:
 
 def test_defaults_written_out_are_the_plain_rule() -> None:
     assert CancelConfig(early_us=1000, late_us=1000, more_horizons_us=(), ways=2, least_shift_px=0).is_plain
+    assert CancelConfig(off_early_us=1000, off_late_us=1000, off_tolerance_px=2.0, choose_px=0, spread_us=0).is_plain
+
+
+def test_a_gate_that_spreads_asks_each_offset_for_its_shift() -> None:
+    # The gate is 0.5 px + a quarter of the shift: 1 px asks for 2 px, √2 px for 3.66, 2 px for 6.
+    config = CancelConfig(horizon_us=8000, tolerance_px=2.0, spread_us=2000, spread_px=0.5)
+    needed = dict(zip(config.offsets, config.spread_shifts_squared, strict=True))
+    assert (needed[0, 0], needed[1, 0], needed[1, 1], needed[0, -2]) == (0, 4, 14, 36)
+    alone = CancelConfig(tolerance_px=2.0, spread_px=1.0)
+    needed = dict(zip(alone.offsets, alone.spread_shifts_squared, strict=True))
+    assert (needed[0, 1], needed[1, 1]) == (0, 1 << 34)
+    assert set(CancelConfig(tolerance_px=2.0).spread_shifts_squared) == {0}
+
+
+def test_gates_of_off_are_those_of_on_unless_given() -> None:
+    config = CancelConfig(early_us=500, off_late_us=3000, off_tolerance_px=1.0)
+    assert (config.early_gates_us, config.late_gates_us) == ((500, 500), (3000, 1000))
+    assert (config.early_gate_us, config.late_gate_us) == (500, 3000)
+    assert (config.reaches_squared_px, config.reach_squared_px) == ((1, 4), 4)
+
+
+def test_events_that_choose_fill_a_ring_for_each_horizon() -> None:
+    table: dict[str, Any] = {"more_horizons_us": (16_000, 32_000), "ring_capacity": 100}
+    assert CancelConfig(**table).ring_capacities == (100,)
+    assert CancelConfig(**table, choose_px=4).ring_capacities == (100, 100, 100)
+    assert CancelConfig(**table, choose_px=4, more_ring_capacities=(50, 20)).ring_capacities == (100, 50, 20)
 
 
 @given(squared=st.integers(0, 64 * 64))
@@ -102,6 +153,7 @@ def test_a_shift_between_two_lattice_distances_requires_the_farther() -> None:
         ({"more_horizons_us": (16_000,), "need": 2}, 17_000),
         ({"carry": 3, "need": 4}, 33_000),
         ({"carry": 3, "need": 4, "more_horizons_us": (9000,)}, 28_000),
+        ({"carry": 3, "need": 4, "more_horizons_us": (9000,), "choose_px": 3}, 37_000),
     ],
 )
 def test_warm_up_covers_the_rounds_that_support_needs(table: dict[str, Any], warm_up_us: int) -> None:

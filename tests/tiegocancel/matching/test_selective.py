@@ -21,7 +21,10 @@ from tiegocancel.motion.schedule import MotionSchedule
 
 
 def drawn(seed: int) -> tuple[CancelConfig, Schedules, Events]:
-    """Return a random configuration with its schedules, and a small crowded stream."""
+    """Return a random configuration with its schedules, and a small crowded stream.
+
+    What chooses, spreads and splits is left out; see :func:`extended`.
+    """
     rng = np.random.default_rng(seed)
     tick_bits = int(rng.integers(0, 4))
     tick = 1 << tick_bits
@@ -46,6 +49,12 @@ def drawn(seed: int) -> tuple[CancelConfig, Schedules, Events]:
         "motion_at": str(rng.choice(["event", "gate"])),
     }
     config = CancelConfig(**table)
+    return config, *met_by(config, rng)
+
+
+def met_by(config: CancelConfig, rng: np.random.Generator) -> tuple[Schedules, Events]:
+    """Return random schedules for a configuration, and a small crowded stream."""
+    horizons = config.horizons_us
     count, width, height = (int(rng.integers(1, most)) for most in (250, 40, 30))
     rows = int(rng.integers(1, 6))
     row_t = np.sort(rng.integers(-300, 2000, rows)).astype(np.int64)
@@ -58,13 +67,50 @@ def drawn(seed: int) -> tuple[CancelConfig, Schedules, Events]:
     t = np.sort(rng.integers(-300, int(rng.choice([300, 2500])), count)).astype(np.int64)
     columns = (rng.integers(0, limit, count) for limit in (width, height, 2))
     events, _ = Events.from_unsorted(t, *columns, width, height)
-    return config, schedules, events
+    return schedules, events
+
+
+def extended(seed: int) -> tuple[CancelConfig, Schedules, Events]:
+    """Return a case in which events choose among three horizons, the gate grows with speed, OFF has its own, or all.
+
+    Few shapes of the kernel, because each is compiled.
+    """
+    rng = np.random.default_rng(seed)
+    chooses, spreads, splits = (bool(seed >> bit & 1) for bit in range(3))
+    table: dict[str, Any] = {
+        "horizon_us": 12,
+        "more_horizons_us": (26, 44),
+        "early_us": int(rng.integers(0, 10)),
+        "late_us": int(rng.integers(0, 10)),
+        "tolerance_px": float(rng.choice([0, 1, 2, 3])),
+        "polarity": str(rng.choice(["opposite", "equal", "ignore"])),
+        "ring_capacity": int(rng.choice([3, 20, 5000])),
+        "carry": 3,
+        "need": int(rng.integers(1, 4)),
+        "uses": int(rng.choice([0, 1, 2])),
+        "bin_bits": int(rng.integers(0, 3)),
+        "set_bits": (1, 2) if chooses != spreads else None,
+        "ways": 3,
+        "least_shift_px": float(rng.choice([0, 0, 1.0])),
+        "motion_at": "gate" if splits and not chooses else "event",
+    }
+    if chooses:
+        table["choose_px"] = float(rng.choice([0.5, 1.0, 2.0, 5.0]))
+        table["more_ring_capacities"] = () if rng.random() < 0.5 else tuple(rng.choice([2, 9, 500], 2).tolist())
+    if spreads:
+        table |= {"spread_us": int(rng.choice([0, 1, 5, 30])), "spread_px": float(rng.choice([0.5, 1.0, 1.5]))}
+    if splits:
+        table |= {"off_early_us": int(rng.integers(0, 10)), "off_late_us": int(rng.integers(0, 10))}
+        table["off_tolerance_px"] = float(rng.choice([0, 1, 2, 3]))
+    config = CancelConfig(**table)
+    return config, *met_by(config, rng)
 
 
 @settings(max_examples=100, deadline=None)
 @given(seed=st.integers(0, 2**32), cuts=st.lists(st.integers(0, 300), max_size=3))
-def test_kernel_equals_the_plain_model(seed: int, cuts: list[int]) -> None:
-    config, schedules, events = drawn(seed)
+@pytest.mark.parametrize("case", [drawn, extended])
+def test_kernel_equals_the_plain_model(case: Any, seed: int, cuts: list[int]) -> None:
+    config, schedules, events = case(seed)
     size = {"width": events.width, "height": events.height}
     canceller, oracle = Canceller(config, schedules, **size), OracleCanceller(config, schedules, **size)
     wanted = oracle.process(events)
@@ -74,6 +120,7 @@ def test_kernel_equals_the_plain_model(seed: int, cuts: list[int]) -> None:
     assert np.concatenate([part.source for part in parts]).tolist() == np.asarray(wanted.source).tolist()
     assert dict(canceller.counters) == dict(oracle.counters)
     assert canceller.pending == oracle.pending
+    assert canceller.most_held == oracle.most_held
 
 
 def test_counts_balance() -> None:

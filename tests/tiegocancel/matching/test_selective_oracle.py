@@ -315,6 +315,68 @@ def test_outside_goes_before_still_and_one_prediction_is_enough() -> None:
         assert run(config, motion, one)[2][counted] == 1
 
 
+def along(px: int) -> MotionSchedule:
+    """Return a motion that moves every event so many px to the right."""
+    return MotionSchedule(np.zeros(1), np.array([[0, 0, px << 16, 0, 0, 0]]))  # type: ignore[arg-type]
+
+
+def test_an_event_chooses_the_shortest_horizon_that_moves_it_far_enough() -> None:
+    rows = [(0, 5, 5, 1), (100, 6, 5, 1), (150, 8, 5, 1), (200, 9, 5, 1)]  # where 1, 3 and 4 px put it
+    three = {"more_horizons_us": (150, 200), "motion": (along(1), along(3), along(4)), "uses": 0}
+    for choose_px, expected in ((0.0, [1, 2, 3]), (1.0, [1]), (1.5, [2]), (3.0, [2]), (3.5, [3]), (9.0, [3])):
+        assert hits(*rows[:1], *rows[1:], choose_px=choose_px, **three) == expected
+
+
+def test_a_ring_that_is_full_leaves_the_other_horizons_theirs() -> None:
+    config = CancelConfig(
+        horizon_us=100, more_horizons_us=(200,), tolerance_us=10, choose_px=2.0,
+        ring_capacity=1, more_ring_capacities=(2,),
+    )  # fmt: skip
+    grows = MotionSchedule(np.zeros(1), np.array([[1 << 15, 0, 0, 0, 0, 0]]))  # type: ignore[arg-type]
+    oracle = SelectiveOracle(config, (grows, grows), width=16, height=16)
+    # x' = 1.5 x: from x = 4 on the first horizon is far enough.
+    oracle.process(Events([0, 0, 0, 0, 0, 1], [1, 5, 5, 2, 2, 9], [3] * 6, [1] * 6, 16, 16))
+    assert (oracle.pending, oracle.most_held) == (3, (1, 2))
+    assert (oracle.counters.predicted, oracle.counters.overflow) == (3, 3)
+    oracle.process(Events([90], [5], [3], [1], 16, 16))  # the first ring's entry has left, this one has come
+    assert (oracle.pending, oracle.counters.ring_high_water) == (3, 3)
+
+
+def test_a_gate_that_spreads_is_wider_where_the_shift_is() -> None:
+    # Over a horizon of 100 µs the gate is a quarter of the shift: 1 px from a shift of 4 px on.
+    for px, expected in ((3, []), (4, [1])):
+        for beside in ((px + 1, 0), (px, 1)):
+            rows = [(0, 2, 5, 1), (100, 2 + beside[0], 5 + beside[1], 1)]
+            assert hits(*rows, motion=along(px), tolerance_px=1.0, spread_us=25) == expected
+            assert hits(*rows, motion=along(px), tolerance_px=1.0) == [1]
+            assert hits(*rows, motion=along(px), tolerance_px=0.0, spread_us=25) == []
+
+
+def test_off_predictions_have_gates_of_their_own() -> None:
+    gates: dict[str, Any] = {"early_us": 3, "late_us": 20, "off_early_us": 8, "off_late_us": 5, "uses": 0}
+    for p, expected in ((1, [2, 3, 4]), (0, [1, 2, 3])):
+        assert hits(*((t, 5, 5, p) for t in (0, 92, 97, 105, 120)), **gates) == expected
+    beside = [(0, 5, 5, 1), (0, 9, 5, 0), (100, 6, 5, 1), (100, 10, 5, 0)]
+    assert hits(*beside, tolerance_px=1.0, off_tolerance_px=0.0) == [2]
+    assert hits(*beside, tolerance_px=0.0, off_tolerance_px=1.0) == [3]
+    # With "equal" an ON event meets OFF predictions, and their gate.
+    across = [(0, 5, 5, 0), (100, 6, 5, 1)]
+    assert hits(*across, polarity="equal", tolerance_px=0.0, off_tolerance_px=1.0) == [1]
+
+
+@settings(max_examples=100)
+@given(seed=seeds)
+def test_a_window_always_open_and_gates_written_twice_change_nothing(seed: int) -> None:
+    config, motion, events = case(seed)
+    same = {
+        "off_early_us": config.early_gate_us,
+        "off_late_us": config.late_gate_us,
+        "off_tolerance_px": config.tolerance_px,
+        "spread_px": config.tolerance_px,
+    }
+    assert run(replace(config, **same), motion, events) == run(config, motion, events)
+
+
 def test_the_source_is_the_event_whose_prediction_was_written_last() -> None:
     config = CancelConfig(horizon_us=100, tolerance_us=10, tolerance_px=0.0, uses=2, more_horizons_us=(150,))
     oracle = SelectiveOracle(config, STILL, width=8, height=8)
