@@ -31,6 +31,7 @@ def build_estimator(
         raise ConfigError(f"[estimate] {error}") from error
     if gyro is None or settings.method == "gyro":
         return estimator
+    from tiegocancel.estimation.inertial.bias import RestConfig
     from tiegocancel.estimation.inertial.fusion import (
         ExponentialConfig,
         ExponentialFusion,
@@ -42,8 +43,8 @@ def build_estimator(
     fusion: Fusion = KalmanFusion()
     if settings.fusion == "exponential":
         fusion = ExponentialFusion(ExponentialConfig(alpha=settings.alpha, event_alpha=settings.alpha))
-        gyro = _without_bias(gyro, settings)
-    return FusedEstimator(estimator, gyro, fusion, row_us=_GYRO_ROW_US)
+    rest = RestConfig() if settings.gyro_bias == "rest" else None
+    return FusedEstimator(estimator, gyro, fusion, row_us=_GYRO_ROW_US, rest=rest)
 
 
 def agile_estimator(settings: EstimateSettings, *, width: int, height: int) -> Estimator:

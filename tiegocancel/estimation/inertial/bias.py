@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections import deque
 from dataclasses import dataclass
@@ -9,12 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tiegocancel.estimation.inertial.gyro import GyroSamples
+from tiegocancel.estimation.inertial.gyro import GyroSamples, image_omega
 
-__all__ = ["GyroBias", "RestConfig", "RestingBias", "estimate_bias"]
+__all__ = ["GyroBias", "Rest", "RestConfig", "RestingBias", "estimate_bias", "rests_of"]
 
 _PARTS = 4
 _LAGS = 200
+_LEAST_SIGMA_RAD_S = 0.002
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -111,6 +113,35 @@ def estimate_bias(samples: GyroSamples, config: RestConfig | None = None) -> Gyr
     values = ", ".join(f"{value:+.5f} ± {error:.1g}" for value, error in zip(bias, sigma, strict=True))
     text = f"bias ({values}) rad/s from {len(rests)} rest(s), {seconds:.2f} s together"
     return GyroBias(bias_rad_s=bias, sigma_rad_s=sigma, noise_rad_s=noise, rests_us=rests, text=text)
+
+
+@dataclass(frozen=True, slots=True)
+class Rest:
+    """What rests up to ``t_us`` tell of the bias of the image's ω (:func:`image_omega`), and one standard deviation."""
+
+    t_us: int
+    image_bias_rad_s: float
+    image_sigma_rad_s: float
+
+
+def rests_of(samples: GyroSamples, config: RestConfig | None = None) -> dict[int, Rest]:
+    """Follow the bias causally over a recording; return what is told at each sample that completes a rest, by time.
+
+    At most one a quarter of ``window_us``, each of samples before its time. They repeat what those before them told, so
+    none is taken as better than ``0.002`` rad/s.
+    """
+    follower = RestingBias(config)
+    index = samples.t_us // follower.config.part_us
+    firsts = np.flatnonzero(np.diff(index, prepend=index[:1] - 1)).tolist()
+    rests: dict[int, Rest] = {}
+    for first, stop in itertools.pairwise([*firsts, len(index)]):
+        before = follower.bias_rad_s
+        follower.process(samples.t_us[first:stop], samples.rate_rad_s[first:stop])
+        if follower.found and not np.array_equal(before, follower.bias_rad_s):
+            t_us = int(samples.t_us[first])
+            sigma = max(float(follower.sigma_rad_s[2]), _LEAST_SIGMA_RAD_S)
+            rests[t_us] = Rest(t_us, float(image_omega(follower.bias_rad_s[None])[0]), sigma)
+    return rests
 
 
 class RestingBias:

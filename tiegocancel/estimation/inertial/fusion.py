@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiegocancel.estimation.estimate import Estimator, MotionEstimate
+from tiegocancel.estimation.inertial.bias import Rest, RestConfig, rests_of
 from tiegocancel.estimation.inertial.gyro import GyroSamples, image_omega
 from tiegocancel.estimation.inertial.held_center import HeldCenter
 from tiegocancel.estimation.inertial.kalman import KalmanConfig, KalmanFusion
@@ -32,6 +33,10 @@ class Fusion(Protocol):
 
     def gyro(self, t_us: int, omega_rad_s: float) -> MotionEstimate:
         """Take one sample of the image's ω in rad/s from the gyroscope (:func:`image_omega`)."""
+        ...
+
+    def rest(self, t_us: int, bias_rad_s: float, sigma_rad_s: float) -> None:
+        """Take the bias of the image's ω that a rest of the gyroscope tells, with one standard deviation."""
         ...
 
     def event(self, estimate: MotionEstimate) -> MotionEstimate:
@@ -61,8 +66,9 @@ class ExponentialConfig:
 class ExponentialFusion:
     """Average exponentially, ω̂ ← (1 − α) ω̂ + α ω̃ (thesis, eq. 3.7), whichever sensor gives ω̃.
 
-    Two numbers of state. It knows neither bias nor time: a gyro's bias passes into ω̂ by the share of its weight, and ω̂
-    trails a changing ω by about (1 − α)/α samples. The deviation is that of the noise alone, without bias and lag.
+    Three numbers of state. It knows of a bias what rests tell, and nothing of time: a bias that no rest told passes
+    into ω̂ by the share of its weight, and ω̂ trails a changing ω by about (1 − α)/α samples. The deviation is that of
+    the noise alone, without bias and lag.
     """
 
     def __init__(
@@ -72,10 +78,15 @@ class ExponentialFusion:
         self._center = HeldCenter(center_px)
         self._omega = math.nan
         self._variance = math.inf
+        self._bias = 0.0
+
+    def rest(self, t_us: int, bias_rad_s: float, sigma_rad_s: float) -> None:
+        """Take off this bias from now on."""
+        self._bias = bias_rad_s
 
     def gyro(self, t_us: int, omega_rad_s: float) -> MotionEstimate:
         """Blend in one gyro sample."""
-        self._blend(omega_rad_s, self.config.gyro_sigma_rad_s, self.config.alpha)
+        self._blend(omega_rad_s - self._bias, self.config.gyro_sigma_rad_s, self.config.alpha)
         return self._row(t_us, "")
 
     def event(self, estimate: MotionEstimate) -> MotionEstimate:
@@ -110,18 +121,22 @@ def fuse(
     omega_rad_s: NDArray[np.float64],
     *,
     row_us: int = 0,
+    rests: Mapping[int, Rest] | None = None,
 ) -> list[MotionEstimate]:
     """Feed both series to a filter in the order of time, the gyro first at equal times; return a row for each instant.
 
-    ``t_us`` int64[m], ``omega_rad_s`` float64[m]: the gyroscope's. Rows that only the gyro caused are left out where
-    they follow the last row by less than ``row_us``.
+    ``t_us`` int64[m], ``omega_rad_s`` float64[m]: the gyroscope's, and its ``rests`` by time, each taken before the
+    sample of that time. Rows that only the gyro caused are left out where they follow the last row by less than ``row_us``.
     """
     rows: list[MotionEstimate] = []
     place = 0
     for estimate in [*estimates, None]:
         stop = len(t_us) if estimate is None else int(np.searchsorted(t_us, estimate.t_us, side="right"))
         for index in range(place, max(stop, place)):
-            row = fusion.gyro(int(t_us[index]), float(omega_rad_s[index]))
+            now_us = int(t_us[index])
+            if rests and now_us in rests:
+                fusion.rest(now_us, rests[now_us].image_bias_rad_s, rests[now_us].image_sigma_rad_s)
+            row = fusion.gyro(now_us, float(omega_rad_s[index]))
             if not rows or row.t_us >= rows[-1].t_us + max(row_us, 1):
                 rows.append(row)
         place = max(stop, place)
@@ -138,10 +153,18 @@ class FusedEstimator:
     """Run an estimator on events and fuse what it finds with a gyroscope on the events' clock.
 
     Each row uses events before its time and gyro samples up to it, nothing later; rows that only the gyro caused follow
-    the last row by ``row_us`` at least.
+    the last row by ``row_us`` at least. With ``rest`` the filter is told the bias whenever the gyroscope rests.
     """
 
-    def __init__(self, estimator: Estimator, gyro: GyroSamples, fusion: Fusion, *, row_us: int = 1000) -> None:
+    def __init__(
+        self,
+        estimator: Estimator,
+        gyro: GyroSamples,
+        fusion: Fusion,
+        *,
+        row_us: int = 1000,
+        rest: RestConfig | None = None,
+    ) -> None:
         if row_us < 0:
             raise ValueError(f"row_us must not be negative, not {row_us}")
         self._estimator = estimator
@@ -149,6 +172,7 @@ class FusedEstimator:
         self._t_us = gyro.t_us
         self._omega = image_omega(gyro)
         self._row_us = row_us
+        self._rests = None if rest is None else rests_of(gyro, rest)
         self._place = 0
         self._last_us: int | None = None
 
@@ -165,7 +189,7 @@ class FusedEstimator:
         due = []
         # Thinned here, not in fuse: the last row may have left with the chunk before.
         events_at = {row.t_us for row in estimates}
-        for row in fuse(self._fusion, estimates, self._t_us[part], self._omega[part]):
+        for row in fuse(self._fusion, estimates, self._t_us[part], self._omega[part], rests=self._rests):
             soon = self._last_us is not None and row.t_us < self._last_us + max(self._row_us, 1)
             again = self._last_us is not None and row.t_us <= self._last_us
             if again or (soon and row.t_us not in events_at):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from tiegocancel.estimation.estimate import MotionEstimate
 from tiegocancel.estimation.inertial.held_center import HeldCenter
@@ -24,8 +24,10 @@ class KalmanConfig:
     ``event_delay_us``: how old the events' ω is at its own time, 0 where an estimator carries it on. An estimate is
     taken with its own deviation times ``event_sigma_scale``, ``least_event_sigma_rad_s`` at least: windows that overlap
     give errors that hang together, so n-fold overlap wants about √n. One that is more than ``gate_sigma`` away is left
-    out, unless ``most_rejected`` in a row were: then bias and ω are opened again. ``max_sigma_rad_s``: beyond it a
-    result is not confident. After ``coast_us`` without an estimate from events the doubt says so.
+    out, unless ``most_rejected`` in a row were: then bias and ω are opened again, but not where that would ask for a
+    bias beyond ``max_bias_rad_s``, nor within ``rest_us`` of a rest of the gyroscope: the events then follow something
+    that moves by itself. ``max_sigma_rad_s``: beyond it a result is not confident. After ``coast_us`` without an
+    estimate from events the doubt says so.
     """
 
     omega_walk: float = 5.0
@@ -39,6 +41,8 @@ class KalmanConfig:
     least_event_sigma_rad_s: float = 1e-3
     gate_sigma: float = 5.0
     most_rejected: int = 10
+    max_bias_rad_s: float = 0.2
+    rest_us: int = 300_000
     max_sigma_rad_s: float = 0.5
     coast_us: int = 200_000
     memory_us: int = 200_000
@@ -53,6 +57,7 @@ class KalmanConfig:
             "event_sigma_scale",
             "least_event_sigma_rad_s",
             "gate_sigma",
+            "max_bias_rad_s",
             "max_sigma_rad_s",
         ):
             if not 0.0 < getattr(self, name) < math.inf:
@@ -61,8 +66,9 @@ class KalmanConfig:
             raise ValueError(f"initial_bias_rad_s must be finite, not {self.initial_bias_rad_s}")
         if self.most_rejected < 1:
             raise ValueError(f"most_rejected must be at least 1, not {self.most_rejected}")
-        if self.coast_us < 0:
-            raise ValueError(f"coast_us must not be negative, not {self.coast_us}")
+        for name in ("coast_us", "rest_us"):
+            if getattr(self, name) < 0:
+                raise ValueError(f"{name} must not be negative, not {getattr(self, name)}")
         if not 0 <= self.event_delay_us <= self.memory_us:
             raise ValueError(
                 f"event_delay_us must be from 0 to memory_us ({self.memory_us}), not {self.event_delay_us}"
@@ -94,13 +100,12 @@ class _State:
             self.bias_variance + config.bias_walk**2 * step_s,
         )
 
-    def measured(self, value: float, variance: float, with_bias: bool) -> _State:
-        """Take a measurement of ω, or of ω + bias."""
-        share = 1.0 if with_bias else 0.0
-        omega_part = self.omega_variance + share * self.covariance
-        bias_part = self.covariance + share * self.bias_variance
-        total = omega_part + share * bias_part + variance
-        away = value - self.omega - share * self.bias
+    def measured(self, value: float, variance: float, omega_share: float, bias_share: float) -> _State:
+        """Take a measurement of ``omega_share``·ω + ``bias_share``·bias."""
+        omega_part = omega_share * self.omega_variance + bias_share * self.covariance
+        bias_part = omega_share * self.covariance + bias_share * self.bias_variance
+        total = omega_share * omega_part + bias_share * bias_part + variance
+        away = value - omega_share * self.omega - bias_share * self.bias
         omega_gain, bias_gain = omega_part / total, bias_part / total
         return _State(
             self.t_us,
@@ -118,15 +123,23 @@ class _Step:
 
     value: float
     variance: float
-    with_bias: bool
+    omega_share: float
+    bias_share: float
     after: _State
+
+    @classmethod
+    def of(cls, state: _State, value: float, variance: float, omega_share: float, bias_share: float) -> _Step:
+        """Take a measurement in."""
+        after = state.measured(value, variance, omega_share, bias_share)
+        return cls(value, variance, omega_share, bias_share, after)
 
 
 class KalmanFusion:
     """Estimate ω and the gyroscope's bias for one axis, both random walks (two states, scalar measurements).
 
-    The gyroscope gives ω + bias at its full rate, the events ω itself, late by ``event_delay_us``: a late one is taken
-    at its own time and the samples since are taken again, which is exact. State: the steps of the last ``memory_us``.
+    The gyroscope gives ω + bias at its full rate, its rests give the bias, the events ω itself, late by
+    ``event_delay_us``: a late one is taken at its own time and the samples since are taken again, which is exact.
+    State: the steps of the last ``memory_us``.
     While the events are in doubt the gyroscope carries ω on alone, and the deviation grows as the bias is less known.
     """
 
@@ -139,6 +152,7 @@ class KalmanFusion:
         self._base: _State | None = None
         self._rejected = 0
         self._event_us: int | None = None
+        self._rest_us: int | None = None
         self._first_us: int | None = None
 
     @property
@@ -154,9 +168,13 @@ class KalmanFusion:
     def gyro(self, t_us: int, omega_rad_s: float) -> MotionEstimate:
         """Take one gyro sample, not before the one ahead of it."""
         state = self._latest(t_us)
-        variance = self.config.gyro_sigma_rad_s**2
-        self._append(_Step(omega_rad_s, variance, True, state.measured(omega_rad_s, variance, True)))
+        self._append(_Step.of(state, omega_rad_s, self.config.gyro_sigma_rad_s**2, 1.0, 1.0))
         return self._row(t_us, "")
+
+    def rest(self, t_us: int, bias_rad_s: float, sigma_rad_s: float) -> None:
+        """Take the bias that a rest of the gyroscope tells, not before the sample ahead of it."""
+        self._rest_us = t_us
+        self._append(_Step.of(self._latest(t_us), bias_rad_s, sigma_rad_s**2, 0.0, 1.0))
 
     def event(self, estimate: MotionEstimate) -> MotionEstimate:
         """Take one estimate from events if it is confident and within the gate."""
@@ -177,23 +195,27 @@ class KalmanFusion:
         doubt = ""
         if apart > self.config.gate_sigma:
             self._rejected += 1
-            if self._rejected < self.config.most_rejected:
+            resting = self._rest_us is not None and estimate.t_us - self._rest_us <= self.config.rest_us
+            impossible = abs(state.bias - away) > self.config.max_bias_rad_s
+            if self._rejected < self.config.most_rejected or resting or impossible:
                 doubt = f"event estimate left out: {apart:.1f} σ away"
             else:
                 # Persistent disagreement: the bias has jumped, or the events had been wrong before.
-                state = _State(
-                    state.t_us, state.omega, state.bias, state.omega_variance + away * away, state.covariance,
-                    state.bias_variance + away * away,
-                )  # fmt: skip
+                state = replace(
+                    state,
+                    omega_variance=state.omega_variance + away * away,
+                    bias_variance=state.bias_variance + away * away,
+                )
         if not doubt:
             self._rejected = 0
             self._event_us = estimate.t_us
-            after = state.measured(estimate.omega_rad_s, sigma * sigma, False)
-            self._steps.append(_Step(estimate.omega_rad_s, sigma * sigma, False, after))
-            state = after
+            self._steps.append(_Step.of(state, estimate.omega_rad_s, sigma * sigma, 1.0, 0.0))
+            state = self._steps[-1].after
         for step in reversed(later):
-            state = state.at(step.after.t_us, self.config).measured(step.value, step.variance, step.with_bias)
-            self._steps.append(_Step(step.value, step.variance, step.with_bias, state))
+            state = state.at(step.after.t_us, self.config)
+            again = _Step.of(state, step.value, step.variance, step.omega_share, step.bias_share)
+            self._steps.append(again)
+            state = again.after
         self._trim()
         return self._row(estimate.t_us, doubt)
 

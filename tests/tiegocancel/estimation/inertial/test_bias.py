@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tiegocancel.estimation.inertial.bias import RestConfig, RestingBias, estimate_bias
+from tiegocancel.estimation.inertial.bias import RestConfig, RestingBias, estimate_bias, rests_of
 from tiegocancel.estimation.inertial.files import read_gyro
 from tiegocancel.estimation.inertial.gyro import GyroSamples
 
@@ -119,6 +119,21 @@ def test_follower_learns_at_rest_and_holds_while_moving():
     assert np.array_equal(known[1250], known[3050])
     assert follower.bias_rad_s == pytest.approx(BIAS, abs=4e-4)
     assert np.abs(follower.bias_rad_s - BIAS).max() < 4 * follower.sigma_rad_s.max()
+
+
+def test_rests_of_a_recording_tell_the_bias_of_the_image_with_nothing_later():
+    samples = made(shaken)
+    rests = rests_of(samples)
+    times = np.array(sorted(rests))
+    assert ((times < 1.05e6) | (times > 3.0e6)).all()
+    assert len(times) == pytest.approx(2.0e6 / RestConfig().part_us, abs=8)
+    for t_us, rest in rests.items():
+        assert rest.image_bias_rad_s == pytest.approx(-BIAS[2], abs=1e-3)  # the image turns the other way
+        assert rest.image_sigma_rad_s >= 0.002
+        assert rest.t_us == t_us
+    stop = int(np.searchsorted(samples.t_us, times[3], side="right"))
+    early = rests_of(GyroSamples(t_us=samples.t_us[:stop], rate_rad_s=samples.rate_rad_s[:stop]))
+    assert early == {int(t_us): rests[int(t_us)] for t_us in times[:4]}
 
 
 def test_follower_follows_a_drift():

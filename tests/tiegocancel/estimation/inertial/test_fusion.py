@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tiegocancel.estimation.estimate import MotionEstimate, trajectory_of
+from tiegocancel.estimation.inertial.bias import RestConfig
 from tiegocancel.estimation.inertial.fusion import (
     ExponentialConfig,
     ExponentialFusion,
@@ -155,11 +156,65 @@ def test_a_short_hijack_of_the_events_is_left_out():
 
 def test_a_lasting_jump_of_the_bias_is_learnt():
     t_us = np.arange(1, 2000) * 1000
-    fused = fuse(KalmanFusion(), [row(time, 1.0, 0.02) for time in t_us[9::10]], t_us, 1.0 + steps(t_us, 0.8))
+    fused = fuse(KalmanFusion(), [row(time, 1.0, 0.02) for time in t_us[9::10]], t_us, 1.0 + steps(t_us, 0.15))
     error = np.abs(np.array([each.omega_rad_s for each in fused]) - 1.0)
     assert error[490] < 0.01
-    assert error[550] > 0.5
+    assert error[550] > 0.1
     assert error[800:].max() < 0.02
+
+
+@pytest.mark.parametrize("wrong", [0.5, -4.0])
+def test_what_no_bias_explains_is_never_believed_of_the_events(wrong):
+    """A mover that fills the view: the gyroscope carries on, and the rows of the events say that they were left out."""
+    t_us = np.arange(1, 2000) * 1000
+    fused = fuse(
+        KalmanFusion(), [row(time, 1.0 + steps(time, wrong), 0.02) for time in t_us[9::10]], t_us, 1.05 + 0 * t_us
+    )
+    assert np.abs(np.array([each.omega_rad_s for each in fused])[200:] - 1.0).max() < 0.02
+    assert sum("σ away" in each.doubt for each in fused) == sum(time >= 500_000 for time in t_us[9::10])
+
+
+def resting(t_us, bias=0.1, *, seed=0):
+    rates = np.random.default_rng(seed).normal(scale=0.002, size=(len(t_us), 3)) - [0.0, 0.0, bias]
+    return GyroSamples(t_us=t_us, rate_rad_s=rates, source="resting")
+
+
+def ticks(stop_us):
+    t = np.arange(0, stop_us, 500)
+    zeros = np.zeros(len(t), np.int64)
+    return Events(t, zeros, zeros, zeros, 4, 4)
+
+
+class Scripted:
+    """An estimator that says what it was told to, at most the rows before the last event."""
+
+    def __init__(self, rows):
+        self.rows = list(rows)
+
+    def process(self, events):
+        due = [each for each in self.rows if each.t_us <= int(events.t[-1])]
+        self.rows = self.rows[len(due) :]
+        return due
+
+
+@pytest.mark.parametrize("make", [ExponentialFusion, KalmanFusion])
+def test_a_gyroscope_at_rest_tells_its_bias(make):
+    t_us = np.arange(1, 2000) * 1000
+    rows = FusedEstimator(Scripted([]), resting(t_us), make(), rest=RestConfig()).process(ticks(2_000_000))
+    omega = np.array([each.omega_rad_s for each in rows])
+    assert abs(omega[150]) > 0.02  # not known yet
+    assert np.abs(omega[400:]).max() < 0.01
+
+
+def test_events_that_disagree_with_a_gyroscope_at_rest_are_left_out():
+    """A static camera before traffic: within what a bias may be, and still not believed while it rests."""
+    t_us = np.arange(1, 2000) * 1000
+    events = [row(time, 0.15, 0.01) for time in t_us[499::10]]
+    rows = FusedEstimator(Scripted(events), resting(t_us), KalmanFusion(), rest=RestConfig()).process(ticks(2_000_000))
+    between = np.array([each.omega_rad_s for each in rows if each.t_us > 500_000 and each.t_us % 10_000])
+    assert np.abs(between).max() < 0.03
+    believed = FusedEstimator(Scripted(events), resting(t_us), KalmanFusion()).process(ticks(2_000_000))
+    assert believed[-2].omega_rad_s == pytest.approx(0.15, abs=0.02)  # without the rest the events are right
 
 
 def test_bias_from_rest_makes_the_gyroscope_absolute():
