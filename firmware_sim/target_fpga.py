@@ -17,11 +17,11 @@ ClockBasis = Literal["pnr-extracted", "pnr-advisory", "typical", "datasheet"]
 """How far to trust a clock: routed with extracted timing; routed, timing doubtful; what designs reach; a limit."""
 
 
-def _positive(table: str, **values: int | float) -> None:
+def _positive(**values: float) -> None:
     """Refuse what must be above zero."""
     for name, value in values.items():
         if not value > 0:
-            raise ValueError(f"{table}{name} must be positive, not {value}")
+            raise ValueError(f"{name} must be positive, not {value}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,7 +34,7 @@ class Logic(Sourced):
 
     def __post_init__(self) -> None:
         Sourced.__post_init__(self)
-        _positive("", luts=self.luts, lut_inputs=self.lut_inputs, ffs=self.ffs)
+        _positive(luts=self.luts, lut_inputs=self.lut_inputs, ffs=self.ffs)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,7 +51,7 @@ class LutRam(Sourced):
 
     def __post_init__(self) -> None:
         Sourced.__post_init__(self)
-        _positive("", words=self.words, width_bits=self.width_bits, luts=self.luts)
+        _positive(words=self.words, width_bits=self.width_bits, luts=self.luts)
         if not 0 < self.share <= 1:
             raise ValueError(f"share must be above 0 and at most 1, not {self.share}")
 
@@ -64,21 +64,28 @@ class BlockRam(Sourced):
     and one write port, with two ports that each read or write; empty where it has none. ``large``: SPRAM, URAM, LRAM,
     meant for big memories. ``init``: contents can be set by the bitstream; otherwise the core must clear it.
     ``read_latency_cycles``: clock edges from address to data, without the optional output register.
+    ``lane_bits``: the fewest neighbouring bits that a write can change alone, 0: only a whole word; rows of a memory
+    can share a block by it. ``worth_luts``: what synthesis takes one block to be worth when it chooses.
     """
 
     name: str
     count: int
     bits: int
+    worth_luts: float
     large: bool
     init: bool
     single: tuple[Mode, ...] = ()
     simple_dual: tuple[Mode, ...] = ()
     true_dual: tuple[Mode, ...] = ()
+    lane_bits: int = 0
     read_latency_cycles: int = 1
 
     def __post_init__(self) -> None:
         Sourced.__post_init__(self)
-        _positive("", count=self.count, bits=self.bits, read_latency_cycles=self.read_latency_cycles)
+        _positive(count=self.count, bits=self.bits, read_latency_cycles=self.read_latency_cycles)
+        _positive(worth_luts=self.worth_luts)
+        if self.lane_bits < 0:
+            raise ValueError(f"lane_bits must not be negative, not {self.lane_bits}")
         modes = self.single + self.simple_dual + self.true_dual
         if not modes:
             raise ValueError("give at least one mode in single, simple_dual or true_dual")
@@ -98,7 +105,7 @@ class Multiplier(Sourced):
 
     def __post_init__(self) -> None:
         Sourced.__post_init__(self)
-        _positive("", count=self.count, a_bits=self.a_bits, b_bits=self.b_bits)
+        _positive(count=self.count, a_bits=self.a_bits, b_bits=self.b_bits)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -128,7 +135,7 @@ class Clock(Sourced):
 
     def __post_init__(self) -> None:
         Sourced.__post_init__(self)
-        _positive("", mhz=self.mhz)
+        _positive(mhz=self.mhz)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -139,7 +146,7 @@ class FpgaEnergy(Sourced):
 
     def __post_init__(self) -> None:
         Sourced.__post_init__(self)
-        _positive("", static_milliwatts=self.static_milliwatts)
+        _positive(static_milliwatts=self.static_milliwatts)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

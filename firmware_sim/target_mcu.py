@@ -36,9 +36,10 @@ class Core(Sourced):
 class InstructionCycles(Sourced):
     """Cycles by class of instruction with memory of no wait states; ``load`` includes its use by the next one.
 
-    ``load_next``: each further load of a run of independent ones. ``div_min``, ``div_max``: 0 where there is no
-    divider. ``branch_taken``, ``branch_not_taken``: a predicted-wrong or unpredictable taken branch where the core
-    predicts. ``call``: branch with link. ``exception_entry``, ``exception_return``: an interrupt's cost, 0 if unknown.
+    ``load_next``: each further load of a run of independent ones. ``branch_taken``, ``branch_not_taken``: predicted
+    rightly where the core predicts; ``mispredict``: what a wrong prediction costs on top, 0 where the core does not
+    predict. ``call``: branch with link. ``div_min``, ``div_max``: 0 where there is no divider or no figure.
+    ``exception_entry``: from the request of an interrupt to its first instruction, 0 where there is no figure.
     """
 
     alu: float
@@ -51,14 +52,16 @@ class InstructionCycles(Sourced):
     call: float
     div_min: float = 0
     div_max: float = 0
+    mispredict: float = 0
     exception_entry: float = 0
-    exception_return: float = 0
 
     def __post_init__(self) -> None:
         Sourced.__post_init__(self)
         for name in ("alu", "load", "load_next", "store", "mul", "branch_taken", "branch_not_taken", "call"):
             if getattr(self, name) <= 0:
                 raise ValueError(f"{name} must be positive, not {getattr(self, name)}")
+        if self.mispredict < 0 or self.exception_entry < 0:
+            raise ValueError("mispredict and exception_entry must not be negative")
         if not 0 <= self.div_min <= self.div_max:
             raise ValueError(f"div_min must be from 0 to div_max = {self.div_max}, not {self.div_min}")
 

@@ -38,14 +38,15 @@ class Sourced:
 
 
 def numbers_of(part: object, path: str = "") -> Iterator[tuple[str, int | float, str]]:
-    """Yield path, value and source of every number below ``part``, lists of modes left whole in their table.
+    """Yield path, value and source of every number below ``part``; what a file leaves at its default is no number of it.
 
-    A list of tables is walked by the entry's ``name`` where it has one: ``memories[DP16KD].bits``.
+    A list of tables is walked by the entry's ``name`` or ``grade``: ``memories[DP16KD].bits``. Modes are left whole:
+    their table's source covers them.
     """
     for field in dataclasses.fields(part):  # type: ignore[arg-type]
         value = getattr(part, field.name)
         place = f"{path}.{field.name}" if path else field.name
-        if isinstance(value, bool):
+        if isinstance(value, bool) or value == field.default:
             continue
         if isinstance(value, int | float) and isinstance(part, Sourced):
             yield place, value, part.source_of(field.name)
@@ -54,7 +55,7 @@ def numbers_of(part: object, path: str = "") -> Iterator[tuple[str, int | float,
         elif isinstance(value, tuple):
             for index, item in enumerate(value):
                 if dataclasses.is_dataclass(item):
-                    yield from numbers_of(item, f"{place}[{getattr(item, 'name', index)}]")
+                    yield from numbers_of(item, f"{place}[{getattr(item, 'name', getattr(item, 'grade', index))}]")
 
 
 def unverified_of(part: object) -> tuple[str, ...]:

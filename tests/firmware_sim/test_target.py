@@ -106,3 +106,44 @@ def test_banks_that_overlap_are_refused(tmp_path: Path) -> None:
     path.write_text(text.replace("base = 0x20040000", "base = 0x2003F000", 1))
     with pytest.raises(ConfigError, match="ram banks 'SRAM0-3' and 'SRAM4' overlap at 0x2003f000"):
         load_target(path)
+
+
+MEASURED = {  # nextpnr's own totals: LUT, FF, block RAM, multipliers
+    "ice40up5k": (5280, 5280, 30, 8),
+    "ice40hx8k": (7680, 7680, 32, 0),
+    "ecp5-25f": (24288, 24288, 56, 28),
+    "ecp5-45f": (43848, 43848, 108, 72),
+    "ecp5-85f": (83640, 83640, 208, 156),
+    "crosslink-nx-40": (32256, 32256, 84, 56),
+    "gw1nr-9": (8640, 6480, 26, 20),
+    "gw2a-18": (20736, 15552, 46, 48),
+}
+
+
+@pytest.mark.parametrize("name", MEASURED)
+def test_no_target_contradicts_the_totals_that_place_and_route_reports(name: str) -> None:
+    target = load_target(name)
+    assert isinstance(target, FpgaTarget)
+    blocks = sum(memory.count for memory in target.memories if not memory.large)
+    assert (target.logic.luts, target.logic.ffs, blocks, target.multiplier_count) == MEASURED[name]
+
+
+def test_the_parts_that_are_asked_for_are_there() -> None:
+    fpgas = {
+        *MEASURED, "artix-7-35t", "artix-7-100t", "zynq-7020", "zu3eg",
+    }  # fmt: skip
+    mcus = {"rp2040", "rp2350", "stm32f405", "stm32f746", "stm32h743", "imxrt1062", "esp32-s3", "nrf52840"}
+    assert {name for name in target_names() if load_target(name).kind == "fpga"} == fpgas
+    assert {name for name in target_names() if load_target(name).kind == "mcu"} == mcus
+    assert {load_memory(name).technology for name in memory_names()} == {"hyperram", "sdram", "ddr3"}
+
+
+@pytest.mark.parametrize("name", memory_names())
+def test_a_longer_access_takes_longer_and_an_open_row_never_does(name: str) -> None:
+    memory = load_memory(name)
+    times = [memory.access_ns(size) for size in (1, 2, 16, 64, 256)]
+    assert times == sorted(times)
+    assert all(
+        memory.access_ns(size, row_open=True) <= time for size, time in zip((1, 2, 16, 64, 256), times, strict=True)
+    )
+    assert 65536 / memory.access_ns(65536) * 1e9 == pytest.approx(memory.peak_bytes_per_second, rel=0.01)
