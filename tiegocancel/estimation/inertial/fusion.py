@@ -126,7 +126,7 @@ def fuse(
     """Feed both series to a filter in the order of time, the gyro first at equal times; return a row for each instant.
 
     ``t_us`` int64[m], ``omega_rad_s`` float64[m]: the gyroscope's, and its ``rests`` by time, each taken before the
-    sample of that time. Rows that only the gyro caused are left out where they follow the last row by less than ``row_us``.
+    sample of that time. Rows that only the gyro caused are left out where they follow the last by less than ``row_us``.
     """
     rows: list[MotionEstimate] = []
     place = 0
