@@ -22,6 +22,7 @@ class ProtocolOptions:
     encoder undoes it. ``off_bit``: a set polarity bit of an eDVS means OFF. A step in time above ``max_jump_us``, or a
     step back, is believed only when what follows confirms it. ``tick_ns`` is one tick of the framed protocol's clock,
     a divisor of 1000. ``now_us`` stamps events that bear no time (E0); by default the host's monotonic clock.
+    ``sensor_bitmap`` asks an eDVS for its sensors' lines every ``sensor_period_ms`` (128: raw gyroscope, 1024: in °/s).
     """
 
     width: int = 0
@@ -34,6 +35,8 @@ class ProtocolOptions:
     max_jump_us: int = 1_000_000
     tick_ns: int = 1000
     now_us: Callable[[], int] | None = None
+    sensor_bitmap: int = 0
+    sensor_period_ms: int = 8
 
     def __post_init__(self) -> None:
         for name in ("width", "height"):
@@ -42,6 +45,10 @@ class ProtocolOptions:
                 raise ConfigError(f"{name} must be from 0 (the protocol's own) to {MAX_SIDE_PX} px, not {side}")
         if self.edvs_format not in EDVS_FORMATS:
             raise ConfigError(f"edvs_format must be one of {', '.join(EDVS_FORMATS)}, not {self.edvs_format!r}")
+        if not 0 <= self.sensor_bitmap < 1 << 32:
+            raise ConfigError(f"sensor_bitmap must be from 0 to {(1 << 32) - 1}, not {self.sensor_bitmap}")
+        if self.sensor_period_ms < 1:
+            raise ConfigError(f"sensor_period_ms must be at least 1 ms, not {self.sensor_period_ms}")
         if self.max_jump_us < 1:
             raise ConfigError(f"max_jump_us must be at least 1 µs, not {self.max_jump_us}")
         if self.tick_ns < 1 or 1000 % self.tick_ns:
