@@ -38,7 +38,7 @@ class Sourced:
 
 
 def numbers_of(part: object, path: str = "") -> Iterator[tuple[str, int | float, str]]:
-    """Yield path, value and source of every number below ``part``; what a file leaves at its default is no number of it.
+    """Yield path, value and source of every number below ``part``; what a file leaves at its default is none.
 
     A list of tables is walked by the entry's ``name`` or ``grade``: ``memories[DP16KD].bits``. Modes are left whole:
     their table's source covers them.
