@@ -26,15 +26,19 @@ def _positive(**values: float) -> None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Logic(Sourced):
-    """Look-up tables (``lut_inputs`` inputs each) and flip-flops of the whole part."""
+    """Look-up tables (``lut_inputs`` inputs each) and flip-flops of the whole part.
+
+    ``lut_factor``: LUTs that a matching core takes here for one on an ECP5.
+    """
 
     luts: int
     lut_inputs: int
     ffs: int
+    lut_factor: float = 1.0
 
     def __post_init__(self) -> None:
         Sourced.__post_init__(self)
-        _positive(luts=self.luts, lut_inputs=self.lut_inputs, ffs=self.ffs)
+        _positive(luts=self.luts, lut_inputs=self.lut_inputs, ffs=self.ffs, lut_factor=self.lut_factor)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
