@@ -21,7 +21,7 @@ class ProtocolOptions:
     to send. ``swap_xy`` exchanges the axes, then ``flip_x`` and ``flip_y`` mirror them, in what a decoder returns; an
     encoder undoes it. ``off_bit``: a set polarity bit of an eDVS means OFF. A step in time above ``max_jump_us``, or a
     step back, is believed only when what follows confirms it. ``tick_ns`` is one tick of the framed protocol's clock,
-    a divisor of 1000. ``now_us`` stamps events that bear no time (E0); by default the host's monotonic clock.
+    a divisor of 1000, and ``frame_events`` the events that a frame of it holds at most. ``now_us`` stamps events that bear no time (E0); by default the host's monotonic clock.
     ``sensor_bitmap`` asks an eDVS for its sensors' lines every ``sensor_period_ms`` (128: raw gyroscope, 1024: in °/s).
     """
 
@@ -34,6 +34,7 @@ class ProtocolOptions:
     off_bit: bool = True
     max_jump_us: int = 1_000_000
     tick_ns: int = 1000
+    frame_events: int = 96
     now_us: Callable[[], int] | None = None
     sensor_bitmap: int = 0
     sensor_period_ms: int = 8
@@ -45,6 +46,8 @@ class ProtocolOptions:
                 raise ConfigError(f"{name} must be from 0 (the protocol's own) to {MAX_SIDE_PX} px, not {side}")
         if self.edvs_format not in EDVS_FORMATS:
             raise ConfigError(f"edvs_format must be one of {', '.join(EDVS_FORMATS)}, not {self.edvs_format!r}")
+        if not 1 <= self.frame_events <= 128:
+            raise ConfigError(f"frame_events must be from 1 to 128, not {self.frame_events}")
         if not 0 <= self.sensor_bitmap < 1 << 32:
             raise ConfigError(f"sensor_bitmap must be from 0 to {(1 << 32) - 1}, not {self.sensor_bitmap}")
         if self.sensor_period_ms < 1:

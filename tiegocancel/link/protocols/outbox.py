@@ -27,13 +27,25 @@ class Outbox:
         self.height = height
         self.last_us: int | None = None
         self._options = options
+        self._ahead_us = 0
+        self.time_us = 0
         self._parts: list[Columns] = []
         self._lines: list[TextLine] = []
 
     def put(self, t: NDArray[np.int64], x: NDArray[Any], y: NDArray[Any], p: NDArray[Any]) -> None:
         """Add columns [n] as the device sent them."""
         if len(t):
+            t = t + self._ahead_us
+            self.time_us = int(t[-1])
             self._parts.append((t, x, y, p))
+
+    def go_on_from(self, t_us: int) -> None:
+        """Let the clock of what comes, which began anew at ``t_us``, go on from the last event."""
+        self._ahead_us = self.time_us - t_us
+
+    def resize(self, width: int, height: int) -> None:
+        """Change the size of the sensor of what comes; take what came before."""
+        self.width, self.height = width, height
 
     def put_line(self, t_us: int, text: str) -> None:
         """Add a line of text, at the time of the event before it."""
