@@ -21,7 +21,8 @@ class ProtocolOptions:
     to send. ``swap_xy`` exchanges the axes, then ``flip_x`` and ``flip_y`` mirror them, in what a decoder returns; an
     encoder undoes it. ``off_bit``: a set polarity bit of an eDVS means OFF. A step in time above ``max_jump_us``, or a
     step back, is believed only when what follows confirms it. ``tick_ns`` is one tick of the framed protocol's clock,
-    a divisor of 1000, and ``frame_events`` the events that a frame of it holds at most. ``now_us`` stamps events that bear no time (E0); by default the host's monotonic clock.
+    a divisor of 1000, and ``frame_events`` the most events that a frame of it holds: fewer lose less on a bad line.
+    ``now_us`` stamps events that bear no time (E0); by default the host's monotonic clock.
     ``sensor_bitmap`` asks an eDVS for its sensors' lines every ``sensor_period_ms`` (128: raw gyroscope, 1024: in °/s).
     """
 

@@ -44,13 +44,11 @@ class EdvsDeltaDecoder:
         self._held += data
         place = 0
         while place < len(self._held):
-            place, waits = self._events_from(place)
-            if waits:
+            place, cut = self._events_from(place)
+            length = -1 if cut else self._beyond_event(place)
+            if length < 0:
                 break
-            if waits := self._beyond_event(place):
-                place += max(waits, 0)
-                if waits < 0:
-                    break
+            place += length
         self._held = self._held[place:]
         return self._outbox.take(self.counters)
 

@@ -28,19 +28,10 @@ class FramedEncoder:
     whole ticks of ``options.tick_ns``. ``session`` tells one run of a device from the next.
     """
 
-    def __init__(
-        self,
-        options: ProtocolOptions,
-        *,
-        frame_events: int = _FRAME_EVENTS,
-        session: int = 0,
-        name: str = "tiegocancel",
-    ) -> None:
-        if not 1 <= frame_events <= MOST_EVENTS:
-            raise ConfigError(f"frame_events must be from 1 to {MOST_EVENTS}, not {frame_events}")
+    def __init__(self, options: ProtocolOptions, *, session: int = 0, name: str = "tiegocancel") -> None:
         self.options = options
         self.frames = 0
-        self._frame_events = frame_events
+        self._frame_events = options.frame_events
         self._session = session
         self._name = name
         self._size = (options.width, options.height)
@@ -108,7 +99,7 @@ class FramedEncoder:
         row = np.arange(len(ticks)) - np.maximum.accumulate(origin)
         starts = row % self._frame_events == 0
         frame = np.cumsum(starts) - 1
-        columns = Columns(ticks, *(c.astype(np.int64) for c in (events.x, events.y, events.p)), frame)
+        columns = Columns(ticks, events.x.astype(np.int64), events.y.astype(np.int64), events.p.astype(np.int64), frame)
         parts = []
         first = np.append(np.flatnonzero(starts), len(ticks)).tolist()
         for payload, at, to in zip(pack(columns, self._event, *self._size), first, first[1:], strict=False):

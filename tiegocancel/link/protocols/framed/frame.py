@@ -44,7 +44,8 @@ def seal_frame(kind: Kind, sequence: int, payload: bytes) -> bytes:
 def seal_content(content: bytes) -> bytes:
     """Seal ``content``, which begins with the two bytes of kind and sequence number."""
     # CRC-16/IBM-3740, also known as CCITT-FALSE: polynomial 0x1021, start 0xFFFF. The standard library has it.
-    return _cobs().encode(content + crc_hqx(content, 0xFFFF).to_bytes(2, "little")) + b"\0"
+    encoded: bytes = _cobs().encode(content + crc_hqx(content, 0xFFFF).to_bytes(2, "little"))
+    return encoded + b"\0"
 
 
 def open_frame(encoded: bytes) -> Frame | None:

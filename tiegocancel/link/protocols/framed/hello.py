@@ -18,8 +18,8 @@ class Hello:
     """Sensor, clock and place in the stream, as of this frame.
 
     ``width`` and ``height`` in px; ``tick_ns`` is one tick; ``session`` changes when the device starts anew;
-    ``decides``: it answers events with decisions; ``next_event`` is the index (modulo 2^16) of the event that comes next and
-    ``ticks`` a time not after it, nor more than 2^32 ticks before it.
+    ``decides``: it answers events with decisions; ``next_event`` is the index (modulo 2^16) of the event that comes
+    next and ``ticks`` a time not after it, nor more than 2^32 ticks before it.
     """
 
     width: int

@@ -114,10 +114,11 @@ def unpack(payloads: list[bytes], base_ticks: _Ints, width: int, height: int) ->
     eight = np.ndarray((len(data) - 7,), "<u8", data, strides=(1,))
     record = eight[at >> 3] >> (at & 7).astype(np.uint64)
     p = (record & np.uint64(1)).astype(np.int64)
-    values, done = [], np.ones(len(frame), np.int64)
+    values: list[_Ints] = []
+    done = np.ones(len(frame), np.int64)
     for index in (1, 2, 0):
-        mask = (np.uint64(1) << widths[index].astype(np.uint64)) - np.uint64(1)
-        values.append((record >> done.astype(np.uint64) & mask).astype(np.int64))
+        low = (np.uint64(1) << widths[index].astype(np.uint64)) - np.uint64(1)
+        values.append((record >> done.astype(np.uint64) & low).astype(np.int64))
         done += widths[index]
     x, y = (_held(value, long, starts, frame) for value, long in zip(values[:2], longs[1:], strict=True))
     elapsed = np.cumsum(values[2])
@@ -147,7 +148,7 @@ class _Column:
         best = np.argmin(np.concatenate([costs_plain, costs_mixed, absolute[:, None]], axis=1), axis=1)
         self.mixed = (best >= len(plain)) & (best < len(plain) + len(mixed))
         self.width = np.where(self.mixed, best - len(plain), np.minimum(best, _ABSOLUTE if len(plain) == 15 else best))
-        width = self.width[frame]
+        width: _Ints = self.width[frame]
         self.long = np.where(self.mixed[frame], need > width, (best == len(plain) + len(mixed))[frame])
         self.value = np.where(self.long, whole, short)
         self.bits = np.where(self.long, full_bits, width)
@@ -177,7 +178,8 @@ def _held(value: _Ints, long: NDArray[np.bool_], starts: _Ints, frame: _Ints) ->
     anchor[long] = index[long]
     anchor = np.maximum.accumulate(anchor)
     origin = np.where(long, value, steps)
-    return origin[anchor] + total - total[anchor]
+    held: _Ints = origin[anchor] + total - total[anchor]
+    return held
 
 
 def _scatter(record: _Ints, at: _Ints, size: int) -> NDArray[np.uint8]:
