@@ -193,6 +193,16 @@ class McuTarget:
         return sum(bank.bytes for bank in self.ram)
 
     @property
+    def largest_piece_bytes(self) -> int:
+        """The largest array that fits: banks that touch, together."""
+        largest, run, stop = 0, 0, -1
+        for bank in self.banks:
+            run = run + bank.bytes if bank.base == stop else bank.bytes
+            stop = bank.base + bank.bytes
+            largest = max(largest, run)
+        return largest
+
+    @property
     def clock_mhz(self) -> float:
         """The greatest clock of the core."""
         return self.core.mhz

@@ -42,7 +42,7 @@ def test_the_two_commands_stand_in_the_readme(readme: str) -> None:
 
 def test_every_command_of_the_readme_runs(readme: str, folder: Path) -> None:
     ran = commands(readme)
-    assert {words[1] for words in ran} == {"demo", "run", "motion", "plan", "simulate", "info", "convert"}
+    assert {words[1] for words in ran} == {"demo", "run", "motion", "plan", "simulate", "info", "convert", "targets"}
     for words in ran:
         done = subprocess.run(
             [sys.executable, "-m", *words], capture_output=True, text=True, cwd=folder, env=os.environ, check=False
