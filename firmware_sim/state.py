@@ -54,7 +54,8 @@ def state_bits(config: CancelConfig, *, width: int, height: int, time_bits: int 
     ``log2(2·(Δt + ε_t) + 1)`` a pending prediction is ambiguous, and ``ValueError`` says so.
 
     **Otherwise** an entry is column, row, polarity and carried support of an event, and a cell is tag, time, polarity,
-    a bit for each horizon (none set: no cell), carried support and ``⌈log2 uses⌉`` bits. In ticks, with
+    a bit for each horizon (none set: no cell), carried support, ``⌈log2 uses⌉`` bits and, under ``line_px``, the
+    predicted place within its bin, ``bin_bits + fraction_bits`` for each axis. In ticks, with
     ``G = early + late + 1``:
 
     - A cell's stamp ``τ'`` is kept modulo ``2^T``. What is written at tick ``τ`` is open until ``L = τ' + late`` and
@@ -123,6 +124,8 @@ def _selective_bits(config: CancelConfig, width: int, height: int, time_bits: in
         cells = config.ways << sum(config.set_bits)
     uses = (config.uses - 1).bit_length() if config.uses else 0
     cell = tag + time_bits + 1 + len(config.horizons_us) + support + uses
+    if config.lines:
+        cell += 2 * (config.bin_bits + config.fraction_bits)
     return StateBits(
         time=time_bits,
         address=address,

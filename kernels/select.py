@@ -17,26 +17,35 @@ COUNTS = ("events", "suppressed", "predicted", "outside", "overflow", "overwritt
 _FARTHEST = 1 << 16  # px; a component of a shift counts for no more where shifts are compared
 
 
-def select(*, horizons, ways, at_gate, chooses, spreads, splits, state):
+def select(*, horizons, ways, at_gate, chooses, spreads, splits, lines, state):
     """Run one launch; ``state`` holds the kernel's arguments by name, as :func:`_kernel` lists them.
 
     ``horizons``: how many; ``ways``: cells of a set, 0 for a cell for every bin; ``at_gate``: predict with the motion
     of the time when the gate opens; ``chooses``: each event is predicted over one horizon, from that one's own ring;
-    ``spreads``: the gate in space grows with the shift; ``splits``: OFF predictions have gates of their own.
+    ``spreads``: the gate in space grows with the shift; ``splits``: OFF predictions have gates of their own;
+    ``lines``: events must lie near the line along which their prediction moves.
     """
     start()
-    _kernel(horizons, ways, at_gate, chooses, spreads, splits)(**state)
+    _kernel(horizons, ways, at_gate, chooses, spreads, splits, lines)(**state)
 
 
 @cache
-def _kernel(horizons, ways, at_gate, chooses, spreads, splits):
+def _kernel(horizons, ways, at_gate, chooses, spreads, splits, lines):
+    @ti.func
+    def moved_by(axis: ti.template(), rows: ti.template(), h: ti.i32, row: ti.i32, x: ti.i64, y: ti.i64) -> ti.i64:
+        return rows[h, row, 3 * axis] * x + rows[h, row, 3 * axis + 1] * y + rows[h, row, 3 * axis + 2]
+
     @ti.func
     def place(axis: ti.template(), rows: ti.template(), h: ti.i32, row: ti.i32, x: ti.i64, y: ti.i64) -> ti.i64:
         along = x
         if ti.static(axis == 1):
             along = y
-        first = rows[h, row, 3 * axis] * x + rows[h, row, 3 * axis + 1] * y + rows[h, row, 3 * axis + 2]
-        return ((along << 16) + first + 32768) >> 16
+        return ((along << 16) + moved_by(axis, rows, h, row, x, y) + 32768) >> 16
+
+    @ti.func
+    def velocity(axis: ti.template(), rows: ti.template(), row: ti.i32, x: ti.i64, y: ti.i64, bits: ti.i32) -> ti.i64:
+        farthest = ti.cast(_FARTHEST, ti.i64) << (bits + 1)
+        return ti.min(ti.max(moved_by(axis, rows, 0, row, x, y) >> (15 - bits), -farthest), farthest)
 
     @ti.func
     def shift_squared(rows: ti.template(), h: ti.i32, row: ti.i32, x: ti.i64, y: ti.i64) -> ti.i64:
@@ -119,6 +128,8 @@ def _kernel(horizons, ways, at_gate, chooses, spreads, splits):
         least_squared: ti.i64,
         choose_squared: ti.i64,
         offsets: ti.types.ndarray(dtype=ti.i32, ndim=2),  # [window, 2] dx dy, nearest first
+        fraction_bits: ti.i32,
+        line_limit: ti.i64,  # 2^-(fraction_bits + 1) px · ticks
         offset_shifts: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [window] px², least shift at which each is looked at
         row_t: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [rows] µs
         rows: ti.types.ndarray(dtype=ti.i64, ndim=3),  # [horizons, rows, 6]
@@ -142,6 +153,8 @@ def _kernel(horizons, ways, at_gate, chooses, spreads, splits):
         cell_sign: ti.types.ndarray(dtype=ti.u8, ndim=1),  # [cells] polarity | support << 1
         cell_uses: ti.types.ndarray(dtype=ti.u8, ndim=1),  # [cells]
         cell_source: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [cells]
+        cell_x: ti.types.ndarray(dtype=ti.i32, ndim=1),  # [cells] 2^-fraction_bits px; [1] unless lines
+        cell_y: ti.types.ndarray(dtype=ti.i32, ndim=1),  # [cells]
         cell_last: ti.types.ndarray(dtype=ti.u8, ndim=1),  # [cells] the horizon that wrote last
         counts: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [8], see COUNTS
         suppressed: ti.types.ndarray(dtype=ti.u8, ndim=1),  # [n] out
@@ -223,9 +236,14 @@ def _kernel(horizons, ways, at_gate, chooses, spreads, splits):
                                     cell_time[cell] = due
                                     cell_source[cell] = ring_source[slot]
                                     cell_last[cell] = ti.u8(h)
+                                    if ti.static(lines):
+                                        fine_x = (from_x << 16) + moved_by(0, rows, h, k, from_x, from_y) + 32768
+                                        fine_y = (from_y << 16) + moved_by(1, rows, h, k, from_x, from_y) + 32768
+                                        cell_x[cell] = ti.cast(fine_x >> (16 - fraction_bits), ti.i32)
+                                        cell_y[cell] = ti.cast(fine_y >> (16 - fraction_bits), ti.i32)
 
                 # The row of the event's own time
-                if ti.static(spreads or not at_gate):
+                if ti.static(spreads or lines or not at_gate):
                     k = row_of[4]
                     while k + 1 < many and row_t[k + 1] <= at:
                         k += 1
@@ -235,6 +253,11 @@ def _kernel(horizons, ways, at_gate, chooses, spreads, splits):
                 shift = ti.i64(0)
                 if ti.static(spreads):
                     shift = shift_squared(rows, 0, row_of[4], column, line)
+                velocity_x = ti.i64(0)
+                velocity_y = ti.i64(0)
+                if ti.static(lines):
+                    velocity_x = velocity(0, rows, row_of[4], column, line, fraction_bits)
+                    velocity_y = velocity(1, rows, row_of[4], column, line, fraction_bits)
                 nearest = -1
                 votes = 0
                 carried = 0
@@ -272,6 +295,13 @@ def _kernel(horizons, ways, at_gate, chooses, spreads, splits):
                                 if ti.static(splits):
                                     far = offsets[o, 0] * offsets[o, 0] + offsets[o, 1] * offsets[o, 1]
                                     passes = passes and far <= reaches[old_sign]
+                                if ti.static(lines):
+                                    # In halves of the kept fraction, so that its middle is a whole number.
+                                    half = ti.cast(1, ti.i64) << fraction_bits
+                                    beyond_x = 2 * half * column - (2 * ti.cast(cell_x[cell], ti.i64) + 1 - half)
+                                    beyond_y = 2 * half * line - (2 * ti.cast(cell_y[cell], ti.i64) + 1 - half)
+                                    passes = passes and abs(beyond_x * horizon[0] - velocity_x * since) <= line_limit
+                                    passes = passes and abs(beyond_y * horizon[0] - velocity_y * since) <= line_limit
                                 if held != 0 and timely and passes:
                                     if nearest < 0:
                                         nearest = cell

@@ -73,6 +73,8 @@ def test_bits_of_a_selective_configuration_by_hand() -> None:
         ({"early_us": 0}, 18 + 10, 7 + 2, 320 * 240),
         ({"bin_bits": 2}, 18 + 10, 8 + 2, 80 * 60),
         ({"off_late_us": 300}, 18 + 10, 9 + 2, 320 * 240),  # 100 + 300 + 1 ticks, and a quarter
+        ({"line_px": 1.0}, 18 + 10, 8 + 2, 320 * 240),
+        ({"line_px": 1.0, "fraction_bits": 2, "bin_bits": 1}, 18 + 10, 8 + 2 + 2 * 3, 160 * 120),
         ({"spread_us": 30, "spread_px": 1.0}, 18 + 10, 8 + 2, 320 * 240),
         ({"set_bits": (3, 12), "ways": 2}, 18 + 10, 8 + 2 + 6, 2 << 15),  # rows are told by the set alone
     ],
@@ -128,10 +130,10 @@ class NarrowStamps(SelectiveOracle):
             return min(ways, key=lambda cell: self._left(cell, now, max(self._late)))
         return first
 
-    def _write(self, at: Any, h: int, due: int, entry: Any, now: int) -> None:
-        cell = self._cell_for(at, now)
-        super()._write(at, h, due, entry, now)
+    def _write(self, at: Any, h: int, due: int, entry: Any, now: int) -> Any:
+        cell = super()._write(at, h, due, entry, now)
         cell.due = due % self._modulus
+        return cell
 
     def _drain(self, maps: Any, h: int, now: int) -> None:
         for tick in range(now if self._clock is None else self._clock, now):

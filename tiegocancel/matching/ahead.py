@@ -9,7 +9,7 @@ import numpy as np
 from tiegocancel.motion.schedule import MotionSchedule
 from tiegocancel.motion.trajectory import Trajectory
 
-__all__ = ["ahead"]
+__all__ = ["ahead", "displacement"]
 
 
 def ahead(motion: MotionSchedule | Trajectory, t_us: int, x: int, y: int, horizon_us: int) -> tuple[int, int]:
@@ -22,9 +22,12 @@ def ahead(motion: MotionSchedule | Trajectory, t_us: int, x: int, y: int, horizo
             np.array([t_us], np.int64), np.array([x], np.uint16), np.array([y], np.uint16), horizon_us
         )
         return int(ahead_x[0]), int(ahead_y[0])
+    across, down = displacement(motion, t_us, x, y)
+    return ((x << 16) + across + 32768) >> 16, ((y << 16) + down + 32768) >> 16
+
+
+def displacement(motion: MotionSchedule, t_us: int, x: int, y: int) -> tuple[int, int]:
+    """Return how far an event at ``(x, y)`` moves within the schedule's horizon, with 16 fractional bits."""
     entry = max(bisect_right(motion.t_us, t_us) - 1, 0)
     a, b, c, d, e, f = (int(value) for value in motion.coefficients[entry])
-    return (
-        ((x << 16) + a * x + b * y + c + 32768) >> 16,
-        ((y << 16) + d * x + e * y + f + 32768) >> 16,
-    )
+    return a * x + b * y + c, d * x + e * y + f

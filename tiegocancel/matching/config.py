@@ -46,6 +46,8 @@ class CancelConfig:
       a ring of its own; 0 predicts over all. ``more_ring_capacities``: of the further horizons' rings, else all alike.
     - ``spread_us`` and ``spread_px``: the gate in space grows with speed, ``spread_px + speed · spread_us``, up to
       ``tolerance_px`` (thesis, eq. 5.5); both 0: it is ``tolerance_px`` everywhere.
+    - ``line_px``: an event must lie so near, in x and in y, to the line along which its prediction moves through its
+      gate in time; 0 asks for nothing. ``fraction_bits`` of the predicted place are kept for it below the pixel.
     - ``off_early_us``, ``off_late_us`` and ``off_tolerance_px``: gates of OFF predictions, those of ON unless given.
 
     Raise ``ValueError`` with field, rule and value.
@@ -72,6 +74,8 @@ class CancelConfig:
     more_ring_capacities: tuple[int, ...] = ()
     spread_us: int = 0
     spread_px: float = 0.0
+    line_px: float = 0.0
+    fraction_bits: int = 0
     off_early_us: int | None = None
     off_late_us: int | None = None
     off_tolerance_px: float | None = None
@@ -87,12 +91,13 @@ class CancelConfig:
             ("bin_bits", 0, 4),
             ("ways", 1, 64),
             ("spread_us", 0, MAX_GATE_US),
+            ("fraction_bits", 0, 3),
         ):
             object.__setattr__(self, name, _whole(name, getattr(self, name), low, high))
         for name in ("early_us", "late_us", "off_early_us", "off_late_us"):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, _whole(name, getattr(self, name), 0, MAX_GATE_US))
-        for name in ("tolerance_px", "least_shift_px", "choose_px", "spread_px", "off_tolerance_px"):
+        for name in ("tolerance_px", "least_shift_px", "choose_px", "spread_px", "line_px", "off_tolerance_px"):
             if name != "off_tolerance_px" or self.off_tolerance_px is not None:
                 object.__setattr__(self, name, _distance(name, getattr(self, name)))
         if self.polarity not in ("opposite", "equal", "ignore"):
@@ -104,6 +109,8 @@ class CancelConfig:
         if len(more) >= MAX_HORIZONS or any(b <= a for a, b in pairwise(self.horizons_us)):
             raise ValueError(f"more_horizons_us must be at most 3, rising from horizon_us, not {list(more)}")
         self._check_choice()
+        if self.fraction_bits and not self.lines:
+            raise ValueError(f"fraction_bits needs line_px, and must be 0, not {self.fraction_bits}")
         object.__setattr__(self, "need", _whole("need", self.need, 1, len(more) + 1 + self.carry))
         if self.set_bits is not None:
             if len(self.set_bits) != 2:
@@ -189,6 +196,7 @@ class CancelConfig:
             and {*self.early_gates_us, *self.late_gates_us} == {self.tolerance_us}
             and self.reaches_squared_px[0] == self.reaches_squared_px[1]
             and not self.spreads
+            and not self.lines
             and self.set_bits is None
             and self.least_shift_squared_px == 0
             and self.motion_at == "event"
@@ -214,6 +222,17 @@ class CancelConfig:
     def spreads(self) -> bool:
         """Tell whether the gate in space grows with speed."""
         return self.spread_us > 0 or self.spread_px > 0
+
+    @property
+    def lines(self) -> bool:
+        """Tell whether events must lie near the line along which their prediction moves."""
+        return self.line_px > 0
+
+    @property
+    def line_limit(self) -> int:
+        """Largest residual from that line, in ``2^-(fraction_bits + 1)`` px times the ticks of the shortest horizon."""
+        ticks = self.horizon_us >> self.tick_bits
+        return math.floor(self.line_px * (2 << self.fraction_bits) * ticks + 1e-9)
 
     @property
     def spread_shifts_squared(self) -> tuple[int, ...]:

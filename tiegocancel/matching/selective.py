@@ -61,6 +61,7 @@ class SelectiveEngine:
             "chooses": config.chooses,
             "spreads": config.spreads,
             "splits": len({*gates}) > 1,
+            "lines": config.lines,
         }
         self._state: dict[str, Any] = {
             "width": width,
@@ -86,6 +87,8 @@ class SelectiveEngine:
             "least_squared": config.least_shift_squared_px,
             "choose_squared": config.choose_squared_px,
             "offsets": np.array(config.offsets, np.int32),
+            "fraction_bits": config.fraction_bits,
+            "line_limit": config.line_limit,
             "offset_shifts": np.array(config.spread_shifts_squared, np.int64),
             "ring_base": np.concatenate([[0], np.cumsum(rings)[:-1]]),
             "ring_room": rings,
@@ -103,6 +106,8 @@ class SelectiveEngine:
             "cell_sign": np.zeros(cells, np.uint8),
             "cell_uses": np.zeros(cells, np.uint8),
             "cell_source": np.zeros(cells, np.int64),
+            "cell_x": np.zeros(cells if config.lines else 1, np.int32),
+            "cell_y": np.zeros(cells if config.lines else 1, np.int32),
             "cell_last": np.zeros(cells, np.uint8),
             "counts": self.counts,
         }

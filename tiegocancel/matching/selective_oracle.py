@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tiegocancel.events import Events
-from tiegocancel.matching.ahead import ahead
+from tiegocancel.matching.ahead import ahead, displacement
 from tiegocancel.matching.canceller import Counters, Decisions
 from tiegocancel.matching.config import MAX_SHIFT_PX, CancelConfig
 from tiegocancel.matching.selective import Schedules, schedules_for
@@ -43,12 +43,14 @@ class _Cell:
     support: int = 0
     source: int = -1
     last: int = 0
+    fine: tuple[int, int] = (0, 0)  # the predicted place in 2^-fraction_bits px, where lines are asked for
 
 
 class SelectiveOracle:
     """Decide as ``semantics.md`` says for every configuration, the plain rule included: slow, readable.
 
     ``motion`` is a schedule, one for each horizon, or a trajectory (float path); it may be replaced between chunks.
+    ``line_px`` needs schedules, and raises ``ValueError`` for a trajectory.
     """
 
     def __init__(
@@ -116,9 +118,11 @@ class SelectiveOracle:
             self._passed[h] += 1
             at, _ = self._place(maps, h, entry)
             if at is not None and due + self._late[entry.p] >= now:
-                self._write(at, h, due, entry, now)
+                cell = self._write(at, h, due, entry, now)
+                if self.config.lines:
+                    cell.fine = self._fine(maps, h, entry)
 
-    def _write(self, at: Bin, h: int, due: int, entry: _Entry, now: int) -> None:
+    def _write(self, at: Bin, h: int, due: int, entry: _Entry, now: int) -> _Cell:
         """Expect in ``at`` what ``entry`` predicts for horizon ``h``, beside or instead of what is expected there."""
         cell = self._cell_for(at, now)
         if self._is_open(cell, now) and cell.bin == at and cell.p == entry.p:
@@ -134,6 +138,7 @@ class SelectiveOracle:
                 self._counts["overwritten"] += 1
             cell.bin, cell.p, cell.horizons, cell.uses, cell.support = at, entry.p, {h}, 1, entry.support
         cell.due, cell.source, cell.last = due, entry.index, h
+        return cell
 
     def _match(
         self, maps: tuple[MotionSchedule | Trajectory, ...], t_us: int, x: int, y: int, p: int
@@ -146,10 +151,38 @@ class SelectiveOracle:
             for cell, squared in self._cells_near(x, y, now, shift)
             if self._passes(cell, now, p) and squared <= self.config.reaches_squared_px[cell.p]
         ]
+        if self.config.lines:
+            moves = self._displacement(maps, 0, t_us, x, y)
+            candidates = [cell for cell in candidates if self._is_on_line(cell, now, (x, y), moves)]
         if not candidates:
             return None, 0
         votes = set().union(*(cell.horizons for cell in candidates))
         return candidates[0], len(votes) + max(cell.support for cell in candidates)
+
+    def _is_on_line(self, cell: _Cell, now: int, at: tuple[int, int], moves: tuple[int, int]) -> bool:
+        """Tell whether an event at ``at`` lies where the prediction of ``cell`` has moved to by then, or nearly."""
+        bits = self.config.fraction_bits
+        for place, fine, move in zip(at, cell.fine, moves, strict=True):
+            most = MAX_SHIFT_PX << (bits + 1)
+            velocity = min(max(move >> (15 - bits), -most), most)
+            residual = (place << (bits + 1)) - (2 * fine + 1 - (1 << bits))
+            if abs(residual * self._horizons[0] - velocity * (now - cell.due)) > self.config.line_limit:
+                return False
+        return True
+
+    def _fine(self, maps: tuple[MotionSchedule | Trajectory, ...], h: int, entry: _Entry) -> tuple[int, int]:
+        """Return the predicted place with ``fraction_bits`` below the pixel; its whole part is the pixel's."""
+        across, down = self._displacement(maps, h, self._asked_us(h, entry), entry.x, entry.y)
+        bits = 16 - self.config.fraction_bits
+        return ((entry.x << 16) + across + 32768) >> bits, ((entry.y << 16) + down + 32768) >> bits
+
+    def _displacement(
+        self, maps: tuple[MotionSchedule | Trajectory, ...], h: int, t_us: int, x: int, y: int
+    ) -> tuple[int, int]:
+        motion = maps[h]
+        if not isinstance(motion, MotionSchedule):
+            raise ValueError("line_px needs a schedule, not a trajectory")
+        return displacement(motion, t_us, x, y)
 
     def _use(self, cell: _Cell) -> None:
         """Take one use from a cell that was hit; a latched one stays."""
@@ -193,14 +226,18 @@ class SelectiveOracle:
 
     def _place(self, maps: tuple[MotionSchedule | Trajectory, ...], h: int, entry: _Entry) -> tuple[Bin | None, bool]:
         """Return the bin of the prediction for horizon ``h``, ``None`` if not made, and whether it lies outside."""
-        horizon_us = self.config.horizons_us[h]
-        waits_us = horizon_us - self.config.early_gate_us if self.config.motion_at == "gate" else 0
-        x, y = ahead(maps[h], entry.t_us + waits_us, entry.x, entry.y, horizon_us)
+        x, y = ahead(maps[h], self._asked_us(h, entry), entry.x, entry.y, self.config.horizons_us[h])
         if not (0 <= x < self.width and 0 <= y < self.height):
             return None, True
         if (x - entry.x) ** 2 + (y - entry.y) ** 2 < self.config.least_shift_squared_px:
             return None, False
         return (x >> self.config.bin_bits, y >> self.config.bin_bits), False
+
+    def _asked_us(self, h: int, entry: _Entry) -> int:
+        """Return the time whose motion predicts an entry."""
+        if self.config.motion_at == "event":
+            return entry.t_us
+        return entry.t_us + self.config.horizons_us[h] - self.config.early_gate_us
 
     def _cells_near(self, x: int, y: int, now: int, shift: int) -> list[tuple[_Cell, int]]:
         """Return the open cells of the bins in the window of an event that moves so far, nearest first, each once.

@@ -102,6 +102,8 @@ def extended(seed: int) -> tuple[CancelConfig, Schedules, Events]:
     if splits:
         table |= {"off_early_us": int(rng.integers(0, 10)), "off_late_us": int(rng.integers(0, 10))}
         table["off_tolerance_px"] = float(rng.choice([0, 1, 2, 3]))
+    if chooses == splits:
+        table |= {"line_px": float(rng.choice([0.5, 1.0, 2.0, 8.0])), "fraction_bits": int(rng.integers(0, 4))}
     config = CancelConfig(**table)
     return config, *met_by(config, rng)
 

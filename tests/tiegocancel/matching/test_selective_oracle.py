@@ -352,6 +352,30 @@ def test_a_gate_that_spreads_is_wider_where_the_shift_is() -> None:
             assert hits(*rows, motion=along(px), tolerance_px=0.0, spread_us=25) == []
 
 
+def test_an_event_must_have_moved_on_by_as_much_as_it_is_late() -> None:
+    # 10 px in 100 µs: a tenth of a pixel a µs. The prediction stands at x = 12 for t = 100.
+    table: dict[str, Any] = {"motion": along(10), "tolerance_px": 2.0, "uses": 0, "line_px": 0.5}
+    first = (0, 2, 5, 1)
+    assert hits(first, *((t, 12, 5, 1) for t in (94, 95, 100, 105, 106)), **table) == [2, 3, 4]
+    assert hits(first, *((t, 13, 5, 1) for t in (104, 105, 110)), **table) == [2, 3]
+    assert hits(first, *((t, 11, 5, 1) for t in (90, 95, 96)), **table) == [1, 2]
+    assert hits(first, (100, 12, 6, 1), **table) == []
+    assert hits(first, (100, 12, 6, 1), **{**table, "line_px": 1.0}) == [1]
+
+
+@pytest.mark.parametrize(("bits", "expected"), [(0, [1, 2]), (1, [1]), (2, [1]), (3, [1])])
+def test_bits_below_the_pixel_tell_where_in_it_the_prediction_stands(bits: int, expected: list[int]) -> None:
+    quarter = MotionSchedule(np.zeros(1), np.array([[0, 0, (10 << 16) + (1 << 14), 0, 0, 0]]))  # type: ignore[arg-type]
+    rows = [(0, 2, 5, 1), (100, 12, 5, 1), (100, 11, 5, 1)]  # 0.25 px before and 1.25 px behind 12.25
+    assert hits(*rows, motion=quarter, tolerance_px=1.0, uses=0, line_px=1.1, fraction_bits=bits) == expected
+
+
+def test_a_line_needs_a_schedule() -> None:
+    turn = RotationTrajectory.constant(center_px=(8.0, 8.0), omega_rad_s=3.0)
+    with pytest.raises(ValueError, match="line_px needs a schedule"):
+        hits((0, 5, 5, 1), (100, 5, 5, 1), motion=turn, line_px=1.0)
+
+
 def test_off_predictions_have_gates_of_their_own() -> None:
     gates: dict[str, Any] = {"early_us": 3, "late_us": 20, "off_early_us": 8, "off_late_us": 5, "uses": 0}
     for p, expected in ((1, [2, 3, 4]), (0, [1, 2, 3])):
@@ -373,6 +397,7 @@ def test_a_window_always_open_and_gates_written_twice_change_nothing(seed: int) 
         "off_late_us": config.late_gate_us,
         "off_tolerance_px": config.tolerance_px,
         "spread_px": config.tolerance_px,
+        "line_px": 64.0,
     }
     assert run(replace(config, **same), motion, events) == run(config, motion, events)
 
