@@ -77,7 +77,13 @@ def run(args: argparse.Namespace) -> int:
             found = estimate_stream(prefilter.kept(reader), estimator, sink=writer.extend, progress=advance)
         three_axes: Trajectory | None = None
         if settings.estimate.method == "gyro" and settings.estimate.calibration is not None and gyro is not None:
-            camera = camera_motion(settings.estimate, gyro, width=reader.width, height=reader.height)
+            camera = camera_motion(
+                settings.estimate,
+                gyro,
+                width=reader.width,
+                height=reader.height,
+                undistorted=settings.read.undistort is not None,
+            )
             three_axes = camera.reported(settings.cancel.horizon_us)
         notes += [*reader.notes]
     if not found.events:

@@ -11,9 +11,10 @@ from tiegocancel.estimation.estimate import Estimator
 if TYPE_CHECKING:
     from tiegocancel.estimation.inertial.gyro import GyroSamples
     from tiegocancel.motion.camera import CameraTrajectory
+    from tiegocancel.motion.intrinsics import CameraIntrinsics
     from tiegocancel.study.settings import EstimateSettings
 
-__all__ = ["agile_estimator", "build_estimator", "camera_motion", "gyro_of"]
+__all__ = ["agile_estimator", "build_estimator", "camera_motion", "gyro_of", "intrinsics_of"]
 
 _GYRO_ROW_US = 1000
 
@@ -81,17 +82,16 @@ def gyro_of(settings: EstimateSettings) -> GyroSamples | None:
     return samples.shifted(settings.gyro_offset_us)
 
 
-def camera_motion(settings: EstimateSettings, gyro: GyroSamples, *, width: int, height: int) -> CameraTrajectory:
-    """Return the turn about three axes that gyroscope and calibration give; each time uses samples before it."""
-    from tiegocancel.motion.camera import CameraTrajectory
-    from tiegocancel.motion.intrinsics import CameraIntrinsics
+def camera_motion(
+    settings: EstimateSettings, gyro: GyroSamples, *, width: int, height: int, undistorted: bool = False
+) -> CameraTrajectory:
+    """Return the turn about three axes that gyroscope and calibration give; each time uses samples before it.
 
-    assert settings.calibration is not None
-    intrinsics = CameraIntrinsics.from_file(settings.calibration)
-    for name, side in (("width", width), ("height", height)):
-        given = getattr(intrinsics, name)
-        if given is not None and given != side:
-            raise ConfigError(f"{settings.calibration}: {name} is {given} px, that of the events {side} px")
+    The lens of the calibration plays no part where the events are ``undistorted``.
+    """
+    from tiegocancel.motion.camera import CameraTrajectory
+
+    intrinsics = intrinsics_of(settings, width=width, height=height, undistorted=undistorted)
     free = _without_bias(gyro, settings)
     return CameraTrajectory(
         t_us=free.t_us,
@@ -103,6 +103,24 @@ def camera_motion(settings: EstimateSettings, gyro: GyroSamples, *, width: int, 
         source=gyro.source,
         notes=free.notes,
     )
+
+
+def intrinsics_of(
+    settings: EstimateSettings, *, width: int, height: int, undistorted: bool = False
+) -> CameraIntrinsics:
+    """Read the calibration that the settings name, without its lens where the events are ``undistorted``.
+
+    Raise ``ConfigError`` where its size is not that of the events.
+    """
+    from tiegocancel.motion.intrinsics import CameraIntrinsics
+
+    assert settings.calibration is not None
+    intrinsics = CameraIntrinsics.from_file(settings.calibration)
+    for name, side in (("width", width), ("height", height)):
+        given = getattr(intrinsics, name)
+        if given is not None and given != side:
+            raise ConfigError(f"{settings.calibration}: {name} is {given} px, that of the events {side} px")
+    return intrinsics.pinhole() if undistorted else intrinsics
 
 
 def _events_estimator(settings: EstimateSettings, width: int, height: int, gyro: GyroSamples | None) -> Estimator:

@@ -11,10 +11,12 @@ from tiegocancel.estimation.contrast.fit import RotationFit
 from tiegocancel.estimation.diagnosis.diagnosis import Diagnosis
 from tiegocancel.estimation.source import trajectory_from
 from tiegocancel.events import Events
+from tiegocancel.motion.camera import CameraTrajectory
+from tiegocancel.motion.camera_csv import is_camera_file, read_camera
 from tiegocancel.motion.rotation import RotationTrajectory
 from tiegocancel.motion.schedule_file import is_schedule_file, read_schedule
 from tiegocancel.motion.trajectory import Trajectory
-from tiegocancel.study.estimators import build_estimator, camera_motion, gyro_of
+from tiegocancel.study.estimators import build_estimator, camera_motion, gyro_of, intrinsics_of
 from tiegocancel.study.feed import FixedMotion, MotionFeed, ScheduledMotion, TrackedMotion
 from tiegocancel.study.settings import Settings
 
@@ -49,8 +51,13 @@ def open_motion(settings: Settings, *, sample: Callable[[], Events], width: int,
         return Found(_estimated(settings, source.lower(), width, height))
     if estimate.gyro is not None:
         raise ConfigError(f"--gyro {estimate.gyro}: serves --motion track and --motion gyro, not {source}")
-    if estimate.calibration is not None:
-        raise ConfigError(f"--calibration {estimate.calibration}: serves --motion gyro, not {source}")
+    turns = _is_file(source) and not is_schedule_file(source) and is_camera_file(source)
+    if estimate.calibration is not None and not turns:
+        raise ConfigError(
+            f"--calibration {estimate.calibration}: serves --motion gyro and CSV files of three axes, not {source}"
+        )
+    if turns:
+        return Found(FixedMotion(_turning_camera(settings, source, width, height)))
     if is_schedule_file(source):
         if settings.motion.path == "float" or settings.motion.refine or settings.motion.interpolation != "file":
             raise ConfigError(
@@ -95,7 +102,8 @@ def _estimated(settings: Settings, source: str, width: int, height: int) -> Moti
         if gyro is None:
             raise ConfigError("--motion gyro: no gyroscope is given; name its file with --gyro")
         if estimate.calibration is not None:
-            camera = camera_motion(estimate, gyro, width=width, height=height)
+            undistorted = settings.read.undistort is not None
+            camera = camera_motion(estimate, gyro, width=width, height=height, undistorted=undistorted)
             return FixedMotion(camera.reported(settings.cancel.horizon_us))
         estimate = replace(estimate, method="gyro")
     estimator = build_estimator(estimate, width=width, height=height, gyro=gyro)
@@ -103,6 +111,22 @@ def _estimated(settings: Settings, source: str, width: int, height: int) -> Moti
     if gyro is not None:
         label = f"{label}, {gyro.source}"
     return TrackedMotion(estimator, source=label, notes=() if gyro is None else gyro.notes)
+
+
+def _turning_camera(settings: Settings, source: str, width: int, height: int) -> CameraTrajectory:
+    """Return the motion of a CSV file of three axes; refuse what serves rotations alone."""
+    if settings.estimate.calibration is None:
+        raise ConfigError(
+            f"--motion {source}: turns about three axes move the image as the lens has it; name the camera's "
+            "intrinsics with --calibration"
+        )
+    if settings.motion.refine:
+        raise ConfigError(f"--refine: {source} is no rotation, and only rotations are refined")
+    if settings.motion.interpolation not in ("file", "linear"):
+        raise ConfigError(f"--motion-interpolation {settings.motion.interpolation}: {source} is linear between rows")
+    undistorted = settings.read.undistort is not None
+    intrinsics = intrinsics_of(settings.estimate, width=width, height=height, undistorted=undistorted)
+    return read_camera(source, intrinsics, width=width, height=height).reported(settings.cancel.horizon_us)
 
 
 def _interpolated(trajectory: Trajectory, settings: Settings) -> Trajectory:

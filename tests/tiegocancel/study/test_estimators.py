@@ -118,3 +118,16 @@ def test_gyroscope_and_calibration_give_a_camera_that_uses_samples_before_each_t
     assert row.center_px == (30.0, 20.0)
     with pytest.raises(ConfigError, match=r"lens\.toml: height is 48 px, that of the events 50 px"):
         camera_motion(wanted, samples(), width=64, height=50)
+
+
+def test_the_lens_plays_no_part_where_events_are_undistorted(tmp_path: Path) -> None:
+    lens = tmp_path / "lens.toml"
+    lens.write_text(
+        "fx = 60.0\nfy = 60.0\ncx = 30.0\ncy = 20.0\nwidth = 64\nheight = 48\ndistortion = [-0.3, 0.1, 0, 0]\n",
+        encoding="utf-8",
+    )
+    wanted = EstimateSettings(calibration=str(lens))
+    assert not camera_motion(wanted, samples(), width=64, height=48).intrinsics.is_pinhole
+    bare = camera_motion(wanted, samples(), width=64, height=48, undistorted=True)
+    assert bare.intrinsics.is_pinhole
+    assert bare.intrinsics.fx == 60.0

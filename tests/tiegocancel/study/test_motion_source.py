@@ -47,6 +47,9 @@ def files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         "order t_us_a_b_c_d_e_f\n0 -65536 0 0 0 0 0\n",
         encoding="utf-8",
     )
+    Path("camera.csv").write_text(
+        "timestamp,omega_x_rad_s,omega_y_rad_s,omega_z_rad_s\n0,0.5,0.25,-3\n0.1,0.5,0.25,-3\n", encoding="utf-8"
+    )
     t = np.arange(0, 90_000, 1000)
     write_gyro(GyroSamples(t_us=t, rate_rad_s=np.tile([0.5, 0.25, -3.0], (len(t), 1))), "gyro.csv")
     Path("lens.toml").write_text(
@@ -88,6 +91,17 @@ def test_a_gyroscope_with_calibration_turns_the_camera_about_three_axes(files: P
     assert any("px off" in note for note in camera.notes)
     assert any("axes" in note for note in camera.notes)
     assert feed.waits
+
+
+def test_a_file_of_three_axes_with_calibration_turns_the_camera_like_its_gyroscope(files: Path) -> None:
+    camera = found("camera.csv", estimate={"calibration": "lens.toml"}).feed.trajectory
+    assert isinstance(camera, CameraTrajectory)
+    assert any("px off" in note for note in camera.notes)
+    gyro = {"gyro": "gyro.csv", "calibration": "lens.toml", "gyro_bias": "none"}
+    measured = found("gyro", estimate=gyro).feed.trajectory
+    assert measured is not None
+    same = [each.schedule(12_000, start_us=0, stop_us=0).coefficients for each in (camera, measured)]
+    assert np.array_equal(*same)
 
 
 def test_a_gyroscope_alone_turns_about_the_principal_point(files: Path, markers: Events) -> None:
@@ -136,7 +150,16 @@ def test_refining_corrects_what_the_residuals_show(files: Path, turning_scene: E
         ("other.schedule", {}, {}, r"made for a horizon of 20000 µs, the run has 12000 µs \(--horizon-us\)"),
         ("fit", {}, {"gyro": "gyro.csv"}, r"--gyro gyro\.csv: serves --motion track and --motion gyro, not fit"),
         ("m.schedule", {}, {"gyro": "gyro.csv"}, r"--gyro gyro\.csv: serves .* not m\.schedule"),
-        ("80,60,1", {}, {"calibration": "lens.toml"}, r"--calibration lens\.toml: serves --motion gyro, not 80,60,1"),
+        (
+            "80,60,1",
+            {},
+            {"calibration": "lens.toml"},
+            r"--calibration lens\.toml: serves --motion gyro and .* not 80,60,1",
+        ),
+        ("turn.csv", {}, {"calibration": "lens.toml"}, r"--calibration lens\.toml: serves .* not turn\.csv"),
+        ("camera.csv", {}, {}, r"--motion camera\.csv: turns about three axes .* --calibration"),
+        ("camera.csv", {"refine": True}, {"calibration": "lens.toml"}, r"--refine: camera\.csv is no rotation"),
+        ("camera.csv", {"interpolation": "spline"}, {"calibration": "lens.toml"}, r"camera\.csv is linear"),
         ("track", {}, {"calibration": "lens.toml", "gyro": "gyro.csv"}, r"--calibration lens\.toml: serves"),
         ("track", {}, {"gyro": "gyro.csv", "gyro_axes": "x,x,z"}, r"--gyro-axes: .* 'x,x,z'"),
         ("track", {}, {"window_us": 7}, r"\[estimate\] window_us"),
