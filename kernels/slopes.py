@@ -15,7 +15,7 @@ sums are the same bits each time.
 import numpy as np
 from tiegocancel.kernels.runtime import start, ti
 
-__all__ = ["SUMS", "rest", "slopes"]
+__all__ = ["SUMS", "energies", "rest", "slopes"]
 
 SUMS = 8 + 36
 """Columns of a tile's row: events, energy, slope 6, curvature 3 × 6, summed squares of the slopes 3 × 6."""
@@ -98,6 +98,40 @@ def _rest(
             for dr in ti.static(range(3)):
                 for dc in ti.static(range(3)):
                     image[r + dr - 1, c + dc - 1] += weight[i] * across[dc] * down[dr]
+
+
+@ti.kernel
+def _energies(
+    image: ti.types.ndarray(dtype=ti.f32, ndim=3),  # [rows, columns, 6] S0 S1 S2 early, then late
+    sums: ti.types.ndarray(dtype=ti.f64, ndim=1),  # [6] out: early², late², early·late, early, late, cells
+):
+    own = ti.f64(0.0)
+    other = ti.f64(0.0)
+    shared = ti.f64(0.0)
+    first = ti.f64(0.0)
+    second = ti.f64(0.0)
+    touched = ti.f64(0.0)
+    ti.loop_config(serialize=True)
+    for r in range(image.shape[0]):
+        # A row is short enough for float32, an image is not.
+        row = ti.Vector([0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+        for c in range(image.shape[1]):
+            early = image[r, c, 0]
+            late = image[r, c, 3]
+            if early != 0.0 or late != 0.0:
+                row += ti.Vector([early * early, late * late, early * late, early, late, 1.0])
+        own += row[0]
+        other += row[1]
+        shared += row[2]
+        first += row[3]
+        second += row[4]
+        touched += row[5]
+    sums[0] = own
+    sums[1] = other
+    sums[2] = shared
+    sums[3] = first
+    sums[4] = second
+    sums[5] = touched
 
 
 @ti.kernel
@@ -234,6 +268,20 @@ def rest(*, x, y, weight, cells_a_px, origin_cells, image):
     if len(x):
         start()
         _rest(x, y, weight, cells_a_px, origin_cells[0], origin_cells[1], image)
+
+
+def energies(image):
+    """Return sums over the cells of an image of :func:`slopes`, six floats.
+
+    Squares of the early and of the late half, their product, both alone, and the count of cells with any event.
+    Raise ``ValueError`` for another shape or dtype.
+    """
+    if image.dtype != np.float32 or image.ndim != 3 or image.shape[2] != 6 or not image.flags.c_contiguous:
+        raise ValueError(f"image must be contiguous float32[rows, columns, 6], not {image.dtype}{image.shape}")
+    sums = np.zeros(6)
+    start()
+    _energies(image, sums)
+    return sums.tolist()
 
 
 def _check(x, y, weight, slot, tau, warp, image):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tiegocancel.kernels.slopes import SUMS, rest, slopes
+from tiegocancel.kernels.slopes import SUMS, energies, rest, slopes
 
 SHAPE = (40, 52, 6)
 RADIUS = 20.0
@@ -233,6 +233,25 @@ def test_images_of_any_size_are_never_written_beyond(shape):
         sums = slopes(**given_)
         assert np.isfinite(sums).all()
         assert (guarded[[0, 2]] == 5.0).all()
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+@settings(max_examples=20)
+def test_energies_are_sums_over_the_cells_with_any_event(seed):
+    rng = np.random.default_rng(seed)
+    image = rng.normal(size=SHAPE).astype(np.float32) * (rng.random(SHAPE) < 0.2)
+    early, late = image[:, :, 0].astype(np.float64), image[:, :, 3].astype(np.float64)
+    squares = ((early**2).sum(), (late**2).sum(), (early * late).sum())
+    expected = (*squares, early.sum(), late.sum(), ((early != 0) | (late != 0)).sum())
+    assert energies(image) == pytest.approx(expected, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    "image", [np.zeros(SHAPE), np.zeros((4, 4), np.float32), np.zeros((4, 4, 12), np.float32)[..., ::2]]
+)
+def test_energies_of_another_image_are_refused(image):
+    with pytest.raises(ValueError, match="image must be contiguous float32"):
+        energies(image)
 
 
 def test_events_at_rest_keep_their_weight_and_place():

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tiegocancel.events import Events
 
-__all__ = ["Rates", "Scratch", "Slopes", "Window"]
+__all__ = ["Rates", "Scratch", "Slopes", "Window", "unfolded"]
 
 Rates = NDArray[np.float64]
 """``a b c d e f`` of the velocity field ``(a·x + b·y + c, d·x + e·y + f)`` about an anchor, in 1/s and px/s."""
@@ -18,23 +18,49 @@ _MARGIN_CELLS = 6
 _MOST_CELLS = 1 << 22
 _MOST_TURN = 20.0
 _FAR = 1e9
+_ORDER = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
+_UNFOLD = np.block([[_ORDER, _ORDER + 6], [_ORDER + 6, _ORDER + 12]])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Slopes:
     """Agreement of a window's early and late events, tile by tile, in px a half window.
 
-    ``tile`` [T] is the index in the image, ``events`` [T], ``energy`` [T], ``slope`` [T, 6] and ``curvature`` [T, 6, 6]
-    along the six rates; ``spread`` [T, 6, 6] is the sum of the outer products of the single events' slopes. Only tiles
-    with events are listed.
+    ``tile`` [T] is the index in the image, ``events`` [T], ``energy`` [T] and ``slope`` [T, 6] along the six rates;
+    ``bends`` [T, 18] and ``squares`` [T, 18] are folded matrices (:func:`unfolded`): the curvature, and the sum of the
+    outer products of the single events' slopes. Only tiles with events are listed.
     """
 
     tile: NDArray[np.int64]
     events: NDArray[np.float64]
     energy: NDArray[np.float64]
     slope: NDArray[np.float64]
-    curvature: NDArray[np.float64]
-    spread: NDArray[np.float64]
+    bends: NDArray[np.float64]
+    squares: NDArray[np.float64]
+
+    @property
+    def curvature(self) -> NDArray[np.float64]:
+        """Return the curvature of each tile, float64[T, 6, 6]."""
+        return unfolded(self.bends)
+
+    @property
+    def spread(self) -> NDArray[np.float64]:
+        """Return the sum of outer products of each tile, float64[T, 6, 6]."""
+        return unfolded(self.squares)
+
+    @property
+    def pan_curvature(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Return the curvature of each tile along x, mixed, and along y: three of the above, float64[T] each."""
+        return self.bends[:, 5], self.bends[:, 11], self.bends[:, 17]
+
+
+def unfolded(moments: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Unfold ``xx xy yy`` × ``XX XY X YY Y 1`` [..., 18] into symmetric matrices [..., 6, 6] over ``a b c d e f``.
+
+    Folded matrices may be summed first: unfolding every tile costs more than the sum.
+    """
+    matrix: NDArray[np.float64] = moments[..., _UNFOLD]
+    return matrix
 
 
 class Scratch:
@@ -119,7 +145,7 @@ class Window:
         )
         held = np.flatnonzero(sums[:, 0])
         sums = sums[held]
-        return Slopes(held, sums[:, 0], sums[:, 1], sums[:, 2:8], _matrix(sums[:, 8:26]), _matrix(sums[:, 26:44]))
+        return Slopes(held, sums[:, 0], sums[:, 1], sums[:, 2:8], sums[:, 8:26], sums[:, 26:44])
 
     def of(self, events: Events) -> Window:
         """Return the window of other events with the same times and anchor."""
@@ -151,15 +177,12 @@ class Window:
         The correlation, −1 to 1, is that of the early and the late events' images where there is any event: without
         their means, because noise of one polarity alone is as bright early as late.
         """
-        from tiegocancel.kernels.slopes import rest
+        from tiegocancel.kernels.slopes import energies, rest
 
-        early, late = self._image[:, :, 0].ravel(), self._image[:, :, 3].ravel()
-        own, other, shared = (float(one @ two) for one, two in ((early, early), (late, late), (early, late)))
+        own, other, shared, first, second, touched = energies(self._image)
         sharpened = own + other + 2.0 * shared
-        first, second = float(early.sum()), float(late.sum())
-        touched = max(int(np.count_nonzero((early != 0.0) | (late != 0.0))), 1)
-        shared -= first * second / touched
-        own, other = own - first * first / touched, other - second * second / touched
+        shared -= first * second / max(touched, 1.0)
+        own, other = own - first * first / max(touched, 1.0), other - second * second / max(touched, 1.0)
         still = self._scratch.take(self._image.shape[:2])
         rest(
             x=self._x,
@@ -211,10 +234,3 @@ class Window:
         table = np.concatenate(maps, axis=1)
         table[:, [2, 5, 8, 11]] *= self.radius_px
         return table.astype(np.float32)
-
-
-def _matrix(moments: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Unfold ``xx xy yy`` × ``XX XY X YY Y 1`` [T, 18] into symmetric matrices [T, 6, 6] over ``a b c d e f``."""
-    order = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
-    xx, xy, yy = (moments[:, first : first + 6][:, order] for first in (0, 6, 12))
-    return np.block([[xx, xy], [xy, yy]])

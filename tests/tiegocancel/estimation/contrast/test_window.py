@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from tiegocancel.estimation.contrast.ascent import rates_of
 from tiegocancel.estimation.contrast.scorer import Twist
-from tiegocancel.estimation.contrast.window import Scratch, Window
+from tiegocancel.estimation.contrast.window import Scratch, Window, unfolded
 from tiegocancel.events import Events
 from tiegocancel.motion.schedule import rotation_coefficients
 
@@ -187,3 +187,14 @@ def test_tiles_of_a_slope_find_their_events_again(turning):
     some = slopes.tile[::3]
     assert abs(window.within(some).sum() - slopes.events[::3].sum()) <= 2  # one on a border may fall to either side
     assert window.within(slopes.tile).sum() >= len(events) - 2
+
+
+def test_sums_of_folded_matrices_unfold_to_the_sums_of_the_tiles(turning):
+    slopes = window_of(turning()).slopes(TRUE, 2.0)
+    weight = np.linspace(0.1, 1.0, len(slopes.tile))
+    curvature = slopes.curvature
+    assert unfolded(weight @ slopes.bends) == pytest.approx(np.tensordot(weight, curvature, 1), rel=1e-9)
+    assert unfolded(weight @ slopes.squares) == pytest.approx(np.tensordot(weight, slopes.spread, 1), rel=1e-9)
+    assert np.array_equal(curvature, np.swapaxes(curvature, 1, 2))
+    for column, (one, other) in zip(slopes.pan_curvature, ((2, 2), (2, 5), (5, 5)), strict=True):
+        assert np.array_equal(column, curvature[:, one, other])
