@@ -11,20 +11,16 @@ from numpy.typing import NDArray
 from tiegocancel.errors import ConfigError
 from tiegocancel.events import Events
 from tiegocancel.files.block import Block
+from tiegocancel.files.evt2_words import HIGH_MASK, KNOWN_KINDS, LOOP_US, TIME_HIGH, WORD, encode_words, event_fields
 from tiegocancel.files.prophesee_raw import PropheseeRawReader
 from tiegocancel.files.words import words
 from tiegocancel.files.writer import EventWriter
 
 __all__ = ["Evt2Reader", "Evt2Writer"]
 
-_TIME_HIGH = 0x8
-_KNOWN = np.zeros(16, np.bool_)
-_KNOWN[[0x0, 0x1, _TIME_HIGH, 0xA, 0xD, 0xE, 0xF]] = True
-_LOOP_US = 1 << 34
-_LOOP_STEPS = (_LOOP_US >> 6) - (10_000 >> 6)
+_LOOP_STEPS = (LOOP_US >> 6) - (10_000 >> 6)
 """A time that falls by nearly the whole range has wrapped; a smaller fall is disorder (OpenEB's decoder)."""
 _BLOCK_WORDS = 1 << 16
-_WORD = np.dtype("<u4")
 
 
 class Evt2Reader(PropheseeRawReader):
@@ -39,18 +35,18 @@ class Evt2Reader(PropheseeRawReader):
 
     def _blocks(self) -> Iterator[Block]:
         base_us, high, loops, without_time = -1, 0, 0, 0
-        for piece, offset in words(self.path, _WORD, self._offset, _BLOCK_WORDS):
+        for piece, offset in words(self.path, WORD, self._offset, _BLOCK_WORDS):
             kind = (piece >> 28).astype(np.uint8)
-            known = _KNOWN[kind]
+            known = KNOWN_KINDS[kind]
             fault = None
             if not known.all():
                 unknown = int(np.argmin(known))
                 fault = self.fail(f"byte {offset + 4 * unknown}", f"word type {kind[unknown]:#x} is none of EVT 2.0's")
                 piece, kind = piece[:unknown], kind[:unknown]
-            at = np.flatnonzero(kind == _TIME_HIGH)
-            highs = np.concatenate([[high], piece[at].astype(np.int64) & 0xFFFFFFF])
+            at = np.flatnonzero(kind == TIME_HIGH)
+            highs = np.concatenate([[high], piece[at].astype(np.int64) & HIGH_MASK])
             turns = np.cumsum(np.diff(highs) <= -_LOOP_STEPS)
-            bases = np.concatenate([[base_us], ((loops + turns) * _LOOP_US) | (highs[1:] << 6)])
+            bases = np.concatenate([[base_us], ((loops + turns) * LOOP_US) | (highs[1:] << 6)])
             cd = np.flatnonzero(kind <= 1)
             if bases[0] < 0:
                 timed = at[0] if len(at) else len(piece)
@@ -73,13 +69,8 @@ def _block(
     cd: NDArray[np.uint32], base_us: NDArray[np.int64], kind: NDArray[np.uint8], offset: int, at: NDArray[np.int64]
 ) -> Block:
     """Take the fields out of event words ``cd`` [n], which stand at the word indices ``at`` behind ``offset``."""
-    return Block(
-        base_us | ((cd >> 22) & 0x3F),
-        ((cd >> 11) & 0x7FF).astype(np.uint16),
-        (cd & 0x7FF).astype(np.uint16),
-        kind,
-        lambda row: f"byte {offset + 4 * int(at[row])}",
-    )
+    low, x, y = event_fields(cd)
+    return Block(base_us | low, x, y, kind, lambda row: f"byte {offset + 4 * int(at[row])}")
 
 
 class Evt2Writer(EventWriter):
@@ -111,20 +102,9 @@ class Evt2Writer(EventWriter):
 
     def _append(self, events: Events) -> None:
         for time_us in (int(events.t[0]), int(events.t[-1])):
-            if not 0 <= time_us < _LOOP_US:
-                raise ConfigError(f"EVT2 holds times from 0 to {_LOOP_US - 1} µs, not {time_us}: write NPZ or CSV")
-        high = events.t >> 6
-        fresh = high != np.concatenate([[self._high], high[:-1]])
-        place = np.arange(len(events)) + np.cumsum(fresh)
-        out = np.empty(len(events) + int(np.count_nonzero(fresh)), _WORD)
-        out[place[fresh] - 1] = (_TIME_HIGH << 28) | high[fresh]
-        out[place] = (
-            (events.p.astype(np.int64) << 28)
-            | ((events.t & 63) << 22)
-            | (events.x.astype(np.int64) << 11)
-            | events.y.astype(np.int64)
-        )
-        self._high = int(high[-1])
+            if not 0 <= time_us < LOOP_US:
+                raise ConfigError(f"EVT2 holds times from 0 to {LOOP_US - 1} µs, not {time_us}: write NPZ or CSV")
+        out, self._high = encode_words(events, self._high)
         self._file.write(out.tobytes())
         self._file.flush()
 
