@@ -19,10 +19,9 @@ _SLACK = 1e-9
 """The gate is inclusive: a distance of 2 px lies within 2 px whatever the last bit of a square root says."""
 
 
-def within(far: NDArray[np.float64], reach_px: NDArray[np.float64] | float) -> NDArray[np.bool_]:
-    """Tell which distances lie within the gate, inclusive."""
-    inside: NDArray[np.bool_] = far <= reach_px * (1.0 + _SLACK) + _SLACK
-    return inside
+def within(far: Any, reach_px: Any) -> Any:
+    """Tell which distances, one or an array of them, lie within the gate, inclusive."""
+    return far <= reach_px * (1.0 + _SLACK) + _SLACK
 
 
 def nearest_admissible(
