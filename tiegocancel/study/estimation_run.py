@@ -17,7 +17,6 @@ from tiegocancel.events import Events
 from tiegocancel.interrupt import deferred_interrupt
 from tiegocancel.motion.rotation import RotationTrajectory
 from tiegocancel.study.result import INTERRUPTED
-from tiegocancel.units import rate_text
 
 __all__ = ["EstimationResult", "estimate_stream"]
 
@@ -26,18 +25,29 @@ _CHUNK_EVENTS = 1 << 17
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EstimationResult:
-    """The rows of one pass over a stream; ``fault`` is the line of the error that ended it early, if one did."""
+    """The rows of one pass over a stream; ``fault`` is the line of the error that ended it early, if one did.
+
+    ``seconds`` is the time that the estimator took, ``begun`` the rows and seconds up to and with the chunk that gave
+    the first confident row: kernels are compiled and the motion is searched from scratch until then.
+    """
 
     estimates: tuple[MotionEstimate, ...]
     events: int
     duration_s: float
     seconds: float
     fault: str | None
+    begun: tuple[int, float] = (0, 0.0)
 
     @property
     def interrupted(self) -> bool:
         """Tell whether the user ended the pass."""
         return self.fault == INTERRUPTED
+
+    @property
+    def updates_per_second(self) -> float | None:
+        """Rows a second of the estimator's own time once it has begun, ``None`` where too few say."""
+        rows, seconds = len(self.estimates) - self.begun[0], self.seconds - self.begun[1]
+        return rows / seconds if rows > 0 and seconds > 0.0 else None
 
     def trajectory(self, *, source: str) -> RotationTrajectory | None:
         """Return the causal motion of the rows, ``None`` where no row knows one."""
@@ -52,8 +62,8 @@ class EstimationResult:
             "events": self.events,
             "duration_s": self.duration_s,
             "seconds": self.seconds,
-            "updates_per_second": len(self.estimates) / self.seconds if self.seconds else 0.0,
-            "events_per_second": self.events / self.seconds if self.seconds else 0.0,
+            "updates_per_second": self.updates_per_second,
+            "begun_seconds": self.begun[1],
             "doubts": _counted([estimate.doubt for estimate in self.estimates if estimate.doubt]),
         }
         if sure:
@@ -83,9 +93,11 @@ class EstimationResult:
             )
         for doubt, count in numbers["doubts"].items():
             lines.append(f"  remark       {count:,} ×: {doubt}")
-        lines.append(
-            f"  speed        {numbers['updates_per_second']:.0f} updates/s, {rate_text(numbers['events_per_second'])}"
-        )
+        if self.estimates:
+            pace, begun = self.updates_per_second, f"{self.begun[1]:.2f} s to compile and begin"
+            lines.append(f"  speed        {begun if pace is None else f'{pace:.0f} updates/s, after {begun}'}")
+        else:
+            lines.append(f"  remark       {self.duration_s * 1e3:.3g} ms of events are too short for a row: --step-us")
         return "\n".join(lines) + "\n"
 
 
@@ -103,6 +115,7 @@ def estimate_stream(
     estimates: list[MotionEstimate] = []
     events, first_us, last_us, seconds = 0, None, 0, 0.0
     fault: str | None = None
+    begun: tuple[int, float] | None = None
     source = iter(rechunk(chunks, _CHUNK_EVENTS))
     with deferred_interrupt() as interrupt:
         while fault is None:
@@ -119,6 +132,8 @@ def estimate_stream(
             rows = estimator.process(chunk)
             seconds += time.perf_counter() - started
             estimates += rows
+            if begun is None and any(row.confident for row in rows):
+                begun = len(estimates), seconds
             if sink is not None:
                 sink(rows)
             if progress is not None:
@@ -133,6 +148,7 @@ def estimate_stream(
         duration_s=0.0 if first_us is None else (last_us - first_us) * 1e-6,
         seconds=seconds,
         fault=fault,
+        begun=begun or (len(estimates), seconds),
     )
 
 

@@ -119,3 +119,19 @@ def test_the_summary_is_valid_json_even_of_rows_that_know_little() -> None:
     numbers = json.loads(json.dumps(found.summary(), allow_nan=False))
     assert numbers["median"] == {"center_px": [80.0, 60.0], "omega_rad_s": 13.0, "sharpness": None}
     assert numbers["updates_per_second"] == 8.0
+
+
+def test_the_pace_is_that_after_the_first_confident_row(markers: Events, scripted: Any) -> None:
+    rows = [row(1_000, confident=False), row(30_000), row(60_000), row(95_000)]
+    found = estimate_stream([markers], scripted(rows[:3]))
+    assert found.begun == (3, found.seconds)
+    assert found.updates_per_second is None
+    assert "to compile and begin" in found.text()
+    paced = EstimationResult(estimates=tuple(rows), events=9, duration_s=0.1, seconds=0.75, fault=None, begun=(2, 0.25))
+    assert paced.updates_per_second == pytest.approx(4.0)
+    assert paced.summary()["updates_per_second"] == pytest.approx(4.0)
+    assert "4 updates/s, after 0.25 s to compile and begin" in paced.text()
+
+
+def test_a_stream_too_short_for_a_row_says_what_to_do(markers: Events, scripted: Any) -> None:
+    assert "too short for a row: --step-us" in estimate_stream([markers], scripted([])).text()
