@@ -1,4 +1,4 @@
-"""Read the gyroscope's text lines that an eDVS mixes into its event stream."""
+"""Read the gyroscope's text lines that an eDVS mixes into its event stream, as they come or from a log of them."""
 
 from __future__ import annotations
 
@@ -6,13 +6,17 @@ import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
+from tiegocancel.errors import InputError
 from tiegocancel.estimation.inertial.gyro import GyroSamples
+from tiegocancel.events import MAX_TIME_US
+from tiegocancel.files.source import open_source
 
-__all__ = ["RAW_STEP_RAD_S", "EdvsGyro", "EdvsLine", "gyro_of_lines", "parse_edvs_line"]
+__all__ = ["RAW_STEP_RAD_S", "EdvsGyro", "EdvsLine", "gyro_of_lines", "is_edvs_log", "parse_edvs_line", "read_edvs_log"]
 
 RAW_STEP_RAD_S = math.radians(2000.0 / 32768.0)
 """One count of the raw gyroscope: 16 bits over ±2000 degrees a second."""
@@ -22,6 +26,8 @@ _RAW, _CALIBRATED = "7", "10"
 _HEX = re.compile(r"[0-9A-Fa-f]{1,8}", re.ASCII)
 _DECIMAL = re.compile(r"[+-]?[0-9]{1,5}", re.ASCII)
 _TAG = re.compile(r"-S([0-9]{1,2})", re.ASCII)
+_LOGGED = re.compile(r"\s*(-?[0-9]{1,19})\s+(\S.*?)\s*", re.ASCII)
+_FIRST = re.compile(rb"(?:\xef\xbb\xbf)?(?:\s*#[^\n]*\n)*\s*-?[0-9]{1,19}[ \t]+-[A-Z]", re.ASCII)
 
 Kind = Literal["gyro", "other", "malformed"]
 
@@ -117,3 +123,36 @@ def gyro_of_lines(lines: Iterable[tuple[int, str]], *, source: str = "eDVS gyros
         rates = np.array(sums) / np.array(counts, np.float64)[:, None]
         samples = GyroSamples(t_us=np.array(times, np.int64), rate_rad_s=rates, source=source, notes=notes)
     return EdvsGyro(samples=samples, lines=total, **tally)
+
+
+def is_edvs_log(start: bytes) -> bool:
+    """Tell by its first bytes whether a file is a log of replies, each after its time."""
+    return _FIRST.match(start) is not None
+
+
+def read_edvs_log(path: Path) -> GyroSamples:
+    """Read lines ``t_us reply``, for instance ``1200 -S10 0000a000 00000000 fffe0000``, in the device's axes.
+
+    The time is that of the last event before the reply, in whole µs. Comments begin with ``#``; other replies are
+    passed over, and notes count gyroscope lines that are spoilt, late or share a time. Raise ``InputError`` naming the
+    row that has no time, or when no line of a gyroscope is there.
+    """
+    with open_source(path) as source:
+        try:
+            text = source.read().decode("utf-8-sig", errors="replace")  # a lost byte spoils a line, not a log
+        except OSError as error:
+            raise InputError(path, "", f"cannot be read: {error.strerror or error}") from None
+    lines: list[tuple[int, str]] = []
+    for number, line in enumerate(text.splitlines(), start=1):
+        if not line.strip() or line.lstrip().startswith("#"):
+            continue
+        found = _LOGGED.fullmatch(line)
+        if found is None or abs(int(found[1])) > MAX_TIME_US:
+            raise InputError(
+                path, f"row {number}", f"expected a time in whole µs and a reply, found {line.strip()[:60]!r}"
+            )
+        lines.append((int(found[1]), found[2]))
+    gyro = gyro_of_lines(lines, source=path.name)
+    if gyro.samples is None:
+        raise InputError(path, "", f"holds no line of a gyroscope (-S7, -S10) among {gyro.lines}")
+    return gyro.samples

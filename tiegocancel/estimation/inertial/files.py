@@ -6,21 +6,24 @@ import csv
 from pathlib import Path
 
 from tiegocancel.errors import ConfigError
+from tiegocancel.estimation.inertial.edvs_lines import is_edvs_log, read_edvs_log
 from tiegocancel.estimation.inertial.gyro import GyroSamples, axes_matrix
 from tiegocancel.files.source import first_bytes
 
 __all__ = ["read_gyro", "write_gyro"]
 
 _AEDAT4 = b"#!AER-DAT4"
+_START_BYTES = 4096
 
 
 def read_gyro(path: str | Path, *, axes: str | None = None, keep_going: bool = False) -> GyroSamples:
-    """Read AEDAT 4.0, CSV with units in the column names, or bare text ``t ax ay az gx gy gz``; told by its start.
+    """Read AEDAT 4.0, a log of eDVS lines, CSV with units in the column names, or bare ``t ax ay az gx gy gz``.
 
-    ``axes`` maps the device's axes to the camera's (:func:`axes_matrix`). Without it CSV and text are taken to be in
-    the camera's frame, and AEDAT 4.0 in that of iniVation's cameras, see :mod:`tiegocancel.estimation.inertial.aedat4`;
-    a note says which. ``keep_going`` turns a fault after the first sample into a note, and the samples before it are
-    returned. Raise ``InputError`` naming the place of the first fault, ``ConfigError`` for ``axes`` that are no map.
+    They are told by their start. ``axes`` maps the device's axes to the camera's (:func:`axes_matrix`). Without it
+    logs, CSV and text are taken to be in the camera's frame, and AEDAT 4.0 in that of iniVation's cameras, see
+    :mod:`tiegocancel.estimation.inertial.aedat4`; a note says which. ``keep_going`` turns a fault after the first
+    sample into a note, and the samples before it are returned. Raise ``InputError`` naming the place of the first
+    fault, ``ConfigError`` for ``axes`` that are no map.
     """
     place = Path(path)
     if axes is not None:
@@ -28,10 +31,13 @@ def read_gyro(path: str | Path, *, axes: str | None = None, keep_going: bool = F
             axes_matrix(axes)
         except ValueError as error:
             raise ConfigError(str(error)) from None
-    if first_bytes(place, len(_AEDAT4)) == _AEDAT4:
+    start = first_bytes(place, _START_BYTES)
+    if start.startswith(_AEDAT4):
         from tiegocancel.estimation.inertial.aedat4 import AXES, read_aedat4_gyro
 
         samples, default = read_aedat4_gyro(place, keep_going=keep_going), AXES
+    elif is_edvs_log(start):
+        samples, default = read_edvs_log(place), "x,y,z"
     else:
         from tiegocancel.estimation.inertial.text import read_text_gyro
 

@@ -145,3 +145,25 @@ def test_no_row_makes_it_crash(tmp_path_factory, rows):
     path.write_text(CSV + rows)
     with contextlib.suppress(InputError):
         read_gyro(path)
+
+
+def test_a_log_of_edvs_lines_is_a_gyroscope(write):
+    text = "# replies\n1200 -S10 0001a000 00000000 fffe0000\n1300 -S11 1 2 3\n1400 -S10 0001\n1400 -S10 0 0 10000\n"
+    samples = read_gyro(write(text), axes="x,y,-z")
+    assert samples.t_us.tolist() == [1200, 1400]
+    assert np.degrees(samples.rate_rad_s) == pytest.approx(np.array([[1.625, 0.0, 2.0], [0.0, 0.0, -1.0]]))
+    assert any("1 line(s) of the gyroscope malformed" in note for note in samples.notes)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("12 -S10 0 0 0\nnoon -S10 0 0 0\n", "row 2: expected a time in whole µs and a reply"),
+        ("12 -S10 0 0 0\n13\n", "row 2"),
+        ("99999999999999999999 -S10 0 0 0\n", "t ax ay az gx gy gz"),
+        ("5 -S11 0 0 0\n", "holds no line of a gyroscope"),
+    ],
+)
+def test_a_faulty_log_is_one_line_with_its_place(write, text, message):
+    with pytest.raises(InputError, match=message):
+        read_gyro(write(text))
