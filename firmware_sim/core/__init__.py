@@ -1,0 +1,1 @@
+"""The matching core of an FPGA: what it decides, bit for bit, and when, to the cycle."""
