@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tiegocancel.cli.options import add_reading_options
 from tiegocancel.cli.progress import event_progress
@@ -42,6 +42,9 @@ def add_parser(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
         "--motion", metavar="M", help="fit (default), track, gyro, CX,CY,OMEGA in px and rad/s, or a CSV of the motion"
     )
     parser.add_argument("--max-kilobytes", type=float, metavar="K", help="most KiB of ring and table")
+    parser.add_argument(
+        "--target", metavar="NAME|FILE", help="part whose RAM bounds ring and table (tiegocancel targets lists them)"
+    )
     parser.add_argument("--max-loss", type=float, metavar="L", help="most mover events lost, a share")
     parser.add_argument("--max-reads", type=int, metavar="R", help="most table reads an event")
     parser.add_argument("--disc-radius-px", type=float, metavar="PX", help="radius of the disc that turns (guessed)")
@@ -91,6 +94,8 @@ def run(args: argparse.Namespace) -> int:
     if result is None:
         raise InputError(args.source, "", "holds no events")
     flicker = result.flicker_note()
+    if result.limits.target is not None:
+        notes.append(f"{result.limits.target} offers {result.limits.target_kib:,.0f} KiB of RAM to ring and table")
     notes += [*result.notes, *([] if flicker is None else [flicker])]
     for note in notes:
         sys.stderr.write(f"note: {note}\n")
@@ -110,8 +115,15 @@ def _plan_config(args: argparse.Namespace) -> PlanConfig:
     from tiegocancel.study.plan import PlanConfig
     from tiegocancel.study.plan_result import PlanLimits
 
+    part: dict[str, Any] = {}
+    if args.target is not None:
+        from tiegocancel.firmware_sim.target import load_target
+        from tiegocancel.firmware_sim.target_ram import usable_ram_bits
+
+        target = load_target(args.target)
+        part = {"target": target.name, "target_kib": usable_ram_bits(target) / 8192}
     try:
-        limits = PlanLimits(max_kib=args.max_kilobytes, max_loss=args.max_loss, max_reads=args.max_reads)
+        limits = PlanLimits(max_kib=args.max_kilobytes, max_loss=args.max_loss, max_reads=args.max_reads, **part)
         return PlanConfig(budget=args.budget, seed=args.search_seed, limits=limits)
     except ValueError as error:
         raise ConfigError(f"plan: {error}") from error

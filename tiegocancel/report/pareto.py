@@ -68,8 +68,8 @@ def _memory(axes: Axes, result: PlanResult) -> None:
         )  # fmt: skip
     axes.set_xscale("log", base=2)
     axes.xaxis.set_major_formatter(FuncFormatter(lambda kib, _: f"{kib:g}"))
-    if result.limits.max_kib is not None:
-        axes.axvline(result.limits.max_kib, color=style.MUTED, linestyle="--", linewidth=0.8)
+    if result.limits.most_kib is not None:
+        axes.axvline(result.limits.most_kib, color=style.MUTED, linestyle="--", linewidth=0.8)
     first = "real events" if result.injected else "ego events"
     axes.set(
         title="selectivity against memory",

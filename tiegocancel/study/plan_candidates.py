@@ -25,6 +25,8 @@ _CHOICES: dict[str, tuple[Any, ...]] = {
     "sets": (None, 1, 0, -1, -2),
     "ways": (4, 8),
     "second": (1.0, 1.33, 2.0),
+    "choose_px": (0.0, 3.0, 4.0, 5.0, 6.0),
+    "line_px": (0.0, 2.0, 1.5, 1.25, 1.0),
 }
 """What each field may be, neighbours side by side."""
 
@@ -59,7 +61,8 @@ class Proposal:
 
     ``travel_px`` at the rim within the horizon, ``gate_px`` within each side of the gate in time, ``radius_squared``
     of the gate in space, ``second`` / first horizon (1: only one). ``sets``: doublings of the number of sets beyond
-    what the open predictions fill at the mean rate, ``None`` for a cell each. The rest is ``CancelConfig``'s.
+    what the open predictions fill at the mean rate, ``None`` for a cell each. ``choose_px``: where there are two
+    horizons, each event takes the first that moves it so far. The rest is ``CancelConfig``'s.
     """
 
     travel_px: float = 12.0
@@ -72,6 +75,8 @@ class Proposal:
     sets: int | None = 0
     ways: int = 8
     second: float = 1.0
+    choose_px: float = 0.0
+    line_px: float = 0.0
 
     def config(self, pace: Pace, *, ring_capacity: int = 1 << 20) -> CancelConfig:
         """Return the configuration; raise ``ValueError`` where the fields contradict each other."""
@@ -92,6 +97,8 @@ class Proposal:
             set_bits=self._set_bits(2 * gate_us * 1e-6 * pace.rate_hz),
             ways=self.ways,
             least_shift_px=1.0,
+            choose_px=self.choose_px if more_us > horizon_us else 0.0,
+            line_px=self.line_px,
             ring_capacity=ring_capacity,
         )
 
@@ -112,9 +119,13 @@ def grid() -> Iterator[Proposal]:
     for travel_px in (12.0, 8.0, 10.0, 6.0, 4.0, 16.0):
         for shape in (near, own, dense):
             yield replace(shape, travel_px=travel_px)
+        if travel_px in (8.0, 10.0):
+            yield replace(near, travel_px=6.0, second=2.0, choose_px=4.0 if travel_px == 8.0 else 3.0)
         # Support takes several horizons to build up; a short recording has time for the plain latch only.
         if travel_px in (8.0, 4.0):
             yield replace(dense, travel_px=travel_px, carry=0, need=1, gate_px=1.0)
+    for line_px in (1.5, 1.0):
+        yield replace(near, travel_px=12.0, line_px=line_px)
     for shape in (near, own):
         for changes in ({"sets": -1}, {"sets": None}, {"gate_px": 2.0}, {"need": 2}, {"carry": 7, "need": 6}):
             yield replace(shape, travel_px=10.0, **changes)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from tiegocancel.study.plan_candidates import Pace
@@ -20,24 +20,34 @@ _LAMP_PERIODS_US = (10_000.0, 1e6 / 120.0)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlanLimits:
-    """Bound the choice; ``None`` bounds nothing. ``max_loss`` is of mover events, a share."""
+    """Bound the choice; ``None`` bounds nothing. ``max_loss`` is of mover events, a share.
+
+    ``target_kib`` is the RAM of the part ``target``, and bounds memory as ``max_kib`` does.
+    """
 
     max_kib: float | None = None
     max_loss: float | None = None
     max_reads: int | None = None
+    target: str | None = None
+    target_kib: float | None = None
 
     def __post_init__(self) -> None:
-        for name in ("max_kib", "max_reads"):
+        for name in ("max_kib", "max_reads", "target_kib"):
             value = getattr(self, name)
             if value is not None and not 0 < value < math.inf:
                 raise ValueError(f"{name} must be positive, not {value!r}")
         if self.max_loss is not None and not 0.0 <= self.max_loss <= 1.0:
             raise ValueError(f"max_loss must be from 0 to 1, not {self.max_loss!r}")
 
+    @property
+    def most_kib(self) -> float | None:
+        """The tighter of the two bounds of memory, ``None`` where there is none."""
+        return min((bound for bound in (self.max_kib, self.target_kib) if bound is not None), default=None)
+
     def allow(self, trial: Trial) -> bool:
         """Tell whether a trial keeps within all limits."""
         return (
-            (self.max_kib is None or trial.kib <= self.max_kib)
+            (self.most_kib is None or trial.kib <= self.most_kib)
             and (self.max_loss is None or trial.mover <= self.max_loss)
             and (self.max_reads is None or trial.reads <= self.max_reads)
         )
@@ -128,7 +138,7 @@ class PlanResult:
             "references": [trial.to_json() for trial in self.references],
             "front": [trial.name for trial in self.front],
             "trials": [trial.to_json() for trial in self.trials],
-            "limits": {name: getattr(self.limits, name) for name in ("max_kib", "max_loss", "max_reads")},
+            "limits": asdict(self.limits),
             "us_per_px": self.pace.us_per_px,
             "rate_hz": self.pace.rate_hz,
             "dropped": self.dropped,

@@ -108,7 +108,7 @@ class Course:
             if whole:
                 suppressed = np.concatenate([suppressed, canceller.process(events[cut:]).suppressed])
             ego, mover = self._share(suppressed, EGO), self._share(suppressed, MOVER)
-            sized = replace(config, ring_capacity=max(math.ceil(HEADROOM * canceller.counters.ring_high_water), 1))
+            sized = _sized(config, canceller.most_held)
             kib = state_bits(sized, width=events.width, height=events.height).total_kib
             reads = reads_per_event(config)
             if hopeless is not None and hopeless(Bound(kib=kib, reads=reads, margin=ego - mover, whole=whole)):
@@ -158,3 +158,9 @@ class Course:
         span_us = config.horizons_us[-1] + (2 << config.tick_bits)
         oldest = np.searchsorted(t, t - span_us, side="left")
         return int((np.arange(len(t)) - oldest).max()) + 1
+
+
+def _sized(config: CancelConfig, most_held: tuple[int, ...]) -> CancelConfig:
+    """Return the configuration with rings for what they held, and :data:`HEADROOM`."""
+    first, *more = (max(math.ceil(HEADROOM * held), 1) for held in most_held)
+    return replace(config, ring_capacity=first, more_ring_capacities=tuple(more))

@@ -64,6 +64,18 @@ def test_the_table_names_the_choice_and_the_references(disc: Path, invoke: Invok
     assert not Path("tiegocancel-plan/pareto.png").exists()
 
 
+def test_the_ram_of_a_part_bounds_the_choice(disc: Path, invoke: Invoke) -> None:
+    arguments = ("--motion", disc.with_name("disc.motion.csv"), "--budget", 2, "--no-figures", "--json")
+    code, out, err = invoke("plan", disc, *arguments, "--target", "rp2040")
+    numbers = json.loads(out)
+    assert code == 0
+    assert (numbers["limits"]["target"], numbers["limits"]["target_kib"]) == ("rp2040", 264.0)
+    assert numbers["chosen"]["kib"] <= 264.0
+    assert "note: rp2040 offers 264 KiB of RAM to ring and table" in err
+    code, _, err = invoke("plan", disc, *arguments, "--target", "rp2041")
+    assert (code, err) == (2, ["tiegocancel: unknown target 'rp2041'; did you mean 'rp2040'?"])
+
+
 def test_limits_that_nothing_keeps_end_in_a_line_and_leave_the_numbers(disc: Path, invoke: Invoke) -> None:
     arguments = ("--motion", disc.with_name("disc.motion.csv"), "--budget", 1, "--max-kilobytes", 0.5, "--out", "p")
     code, _, err = invoke("plan", disc, *arguments)

@@ -171,3 +171,14 @@ def test_unlabelled_events_are_no_course(events: Events) -> None:
 def test_a_search_without_bounds_is_refused(values: dict[str, int]) -> None:
     with pytest.raises(ValueError, match=f"{next(iter(values))} must"):
         PlanConfig(**values)  # type: ignore[arg-type]
+
+
+def test_the_rings_of_a_choice_are_as_large_as_each_was_filled(ground: Ground) -> None:
+    two = replace(CONFIG, horizon_us=5120, more_horizons_us=(10_240,), choose_px=3.0)
+    trial = ground.course.run("two", two)
+    assert trial is not None
+    assert len(trial.config.ring_capacities) == 2
+    assert sum(trial.config.ring_capacities) >= trial.high_water > max(trial.config.ring_capacities) / 1.25
+    again = ground.course.run("again", trial.config)
+    assert again is not None
+    assert (again.ego, again.mover, again.kib) == (trial.ego, trial.mover, trial.kib)

@@ -51,6 +51,13 @@ def test_every_proposal_of_the_grid_is_another_configuration_of_the_disc() -> No
     assert len(set(configs)) == len(configs) >= 25
 
 
+def test_a_choice_among_horizons_is_proposed_where_there_are_two() -> None:
+    config = Proposal(travel_px=6.0, second=2.0, choose_px=4.0, line_px=1.5).config(DISC)
+    assert (config.horizons_us, config.choose_px, config.line_px) == ((6144, 12_800), 4.0, 1.5)
+    assert not Proposal(travel_px=6.0, second=1.0, choose_px=4.0).config(DISC).chooses
+    assert any(proposal.config(DISC).chooses for proposal in itertools.islice(grid(), 12))
+
+
 def test_the_first_proposals_of_the_grid_differ_in_their_gates() -> None:
     assert len({proposal.radius_squared for proposal in itertools.islice(grid(), 3)}) == 3
 

@@ -49,6 +49,13 @@ def test_nothing_is_smaller_and_better_than_the_front(points: list[tuple[float, 
     assert knee_of(front) in front
 
 
+def test_the_tighter_bound_of_memory_counts() -> None:
+    assert PlanLimits().most_kib is None
+    assert PlanLimits(max_kib=100.0, target_kib=264.0).most_kib == 100.0
+    both = PlanLimits(max_kib=500.0, target="a part", target_kib=60.0)
+    assert result(SMALL, MIDDLE, limits=both).chosen is SMALL
+
+
 def test_the_knee_is_where_more_memory_stops_paying() -> None:
     assert knee_of(front_of([trial("bare", kib=40.0, ego=0.3), SMALL, MIDDLE, LARGE])) is SMALL
 
