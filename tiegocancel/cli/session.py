@@ -1,4 +1,4 @@
-"""Carry one run from events to files on disk: what ``run`` and ``demo`` share."""
+"""Carry one run from events, of a recording or a link, to files on disk: what ``run`` and ``demo`` share."""
 
 from __future__ import annotations
 
@@ -6,21 +6,24 @@ import argparse
 import contextlib
 import json
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tiegocancel.cli.outputs import OutputFolder
 from tiegocancel.cli.progress import event_progress
-from tiegocancel.cli.summary import summary_text
+from tiegocancel.cli.summary import link_text, summary_text
 from tiegocancel.errors import InputError
 from tiegocancel.estimation.contrast.fit import RotationFit
 from tiegocancel.events import Events
 from tiegocancel.files import EventWriter, open_writer
+from tiegocancel.link.source import LinkSource
 from tiegocancel.study import INTERRUPTED, RunResult, Settings, Verdict, judge, run_stream
 from tiegocancel.study.feed import MotionFeed, TrackedMotion
+from tiegocancel.study.live import Watcher, run_live
 from tiegocancel.study.motion_source import Found
 
 __all__ = ["Session"]
@@ -68,6 +71,46 @@ class Session:
                 expected_us=expected_us,
                 progress=advance,
             )
+        return self._finish(result, found, sink, notes, photograph=photograph)
+
+    def run_link(
+        self,
+        link: LinkSource,
+        found: Found,
+        *,
+        width: int,
+        height: int,
+        sinks: Sequence[Callable[[Events], None]] = (),
+        watch: Watcher | None = None,
+    ) -> int:
+        """Run over a live link; ``sinks`` take the residual of each chunk too. Return the exit code as :meth:`run`."""
+        self.folder.prepare()
+        with (
+            self._residual_writer(width, height, False) as sink,
+            self._estimate_writer(found.feed),
+        ):
+            every = [*([] if sink is None else [sink.write]), *sinks]
+
+            def hand_on(residual: Events) -> None:
+                for take in every:
+                    take(residual)
+
+            result = run_live(link, self.settings, found.feed, sink=hand_on, watch=watch)
+            # What the device's end and the thread's have to say belongs into the report.
+            link.close()
+        return self._finish(result, found, sink, link.notes(), link=link.to_json())
+
+    def _finish(
+        self,
+        result: RunResult | None,
+        found: Found,
+        sink: EventWriter | None,
+        notes: list[str],
+        *,
+        photograph: NDArray[np.float32] | None = None,
+        link: dict[str, Any] | None = None,
+    ) -> int:
+        """Say what there is to say, write numbers, figures and report, and return the exit code."""
         if sink is not None:
             notes = [*notes, *sink.notes]
         notes += [f"refining: {diagnosis.text}" for diagnosis in found.diagnoses]
@@ -76,7 +119,7 @@ class Session:
             sys.stderr.write(f"note: {note}\n")
         if result is None:
             raise InputError(self.title, "", "holds no events")
-        self._write(result, judge(result), found.fit, notes, photograph)
+        self._write(result, judge(result), found.fit, notes, photograph, link)
         if result.fault is None:
             return 0
         sys.stderr.write(f"tiegocancel: {result.fault}\n")
@@ -115,6 +158,7 @@ class Session:
         fit: RotationFit | None,
         notes: list[str],
         photograph: NDArray[np.float32] | None,
+        link: dict[str, Any] | None,
     ) -> None:
         """Print the numbers, write the manifest, then figures and report: numbers first, in case drawing is cut."""
         from tiegocancel.report import draw_figures, write_page
@@ -122,6 +166,8 @@ class Session:
         numbers = result.to_json()
         numbers["verdict"] = {"grade": verdict.grade, "headline": verdict.headline, "reasons": list(verdict.reasons)}
         numbers["notes"] = [*notes, *result.trajectory.notes, *numbers["notes"]]
+        if link is not None:
+            numbers["link"] = link
         if fit is not None:
             numbers["motion"] |= {"confident": fit.confident, "contrast_gain": fit.contrast_gain}
         self.folder.write_manifest(self.settings, numbers)
@@ -136,4 +182,7 @@ class Session:
         if self.args.json:
             sys.stdout.write(json.dumps(numbers) + "\n")
         else:
-            sys.stdout.write(summary_text(result, verdict) + f"report: {page}\n")
+            # Standard output may carry the residual events.
+            talk = sys.stderr if getattr(self.args, "residual_to", None) == "-" else sys.stdout
+            said = "" if link is None else link_text(link)
+            talk.write(summary_text(result, verdict) + said + f"report: {page}\n")

@@ -128,7 +128,9 @@ def add_estimate_options(parser: argparse.ArgumentParser) -> None:
         "--step-us", type=int, metavar="US", help="time between estimates (10000; circle 2000, gyro 1000)"
     )
     group.add_argument("--window-us", type=int, metavar="US", help="past that an estimate looks at (20000)")
-    group.add_argument("--max-events", type=int, metavar="N", help="events that a window draws (20000)")
+    group.add_argument(
+        "--window-events", type=int, dest="max_events", metavar="N", help="events that a window draws (20000)"
+    )
     group.add_argument("--max-omega", type=float, metavar="RAD_S", help="largest angular velocity sought (200)")
     group.add_argument("--estimate-seed", type=int, metavar="N", help="seed of the draws (0)")
     group.add_argument("--gyro", metavar="FILE", help="gyroscope: AEDAT4 or CSV; fused, or used alone by gyro")
@@ -140,7 +142,7 @@ def add_estimate_options(parser: argparse.ArgumentParser) -> None:
         "--alpha", type=float, metavar="A", help="weight of a new value in the exponential average (0.2)"
     )
     group.add_argument(
-        "--calibration", metavar="FILE", help="intrinsics of the camera, for a gyroscope about three axes"
+        "--calibration", metavar="FILE", help="intrinsics of the camera, for a gyroscope or motion about three axes"
     )
 
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from tiegocancel.metrics import Share
 from tiegocancel.study import RunResult, Verdict
 from tiegocancel.study.controls import CONTROLS
 from tiegocancel.study.prefilter import filter_text
 from tiegocancel.units import rate_text
 
-__all__ = ["summary_text"]
+__all__ = ["link_text", "summary_text"]
 
 
 def summary_text(result: RunResult, verdict: Verdict) -> str:
@@ -49,6 +51,18 @@ def summary_text(result: RunResult, verdict: Verdict) -> str:
     speed = rate_text(result.counters.events / result.seconds) if result.seconds else "–"
     lines.append(f"  speed        {speed}; state {result.state.total_kib:,.0f} KiB")
     return "\n".join(lines) + "\n"
+
+
+def link_text(link: dict[str, Any]) -> str:
+    """Say what came over a link, how long it waited, and what was lost."""
+    latency, queue, wire = link["latency"], link["queue"], link["decoder"]
+    lost = wire["lost_events"] + queue["dropped"] + queue["thinned"]
+    return (
+        f"  link         {link['events']:,} events, {wire['bytes']:,} bytes; {lost:,} events lost, "
+        f"{wire['bad_bytes']:,} bad bytes, {wire['lost_frames']:,} frames lost, {link['reconnects']} reconnections\n"
+        f"  latency      byte to decision: p50 {latency['p50_ms']:.2f} ms, p99 {latency['p99_ms']:.2f} ms, "
+        f"max {latency['max_ms']:.2f} ms; at most {queue['high_water']:,} events waited\n"
+    )
 
 
 def _percent(share: Share) -> str:

@@ -23,6 +23,7 @@ class PseudoTerminal:
     """
 
     ended = False
+    answers = True
 
     def __init__(self, *, symlink: Path | None = None, write_timeout_s: float = 5.0) -> None:
         try:

@@ -89,7 +89,8 @@ class LinkReader(threading.Thread):
             line: AnyLine | None = None
             try:
                 line = self._open()
-                self.banner = self._host.start(line) or self.banner
+                if line.answers:
+                    self.banner = self._host.start(line) or self.banner
                 self.started.set()
                 return line
             except LinkError as error:
@@ -126,8 +127,9 @@ class LinkReader(threading.Thread):
                 return
             if self._options.silence_s and time.monotonic() - last_s > self._options.silence_s:
                 raise TiegoCancelError(f"{line.port}: no byte for {self._options.silence_s:g} s")
-        with contextlib.suppress(LinkError):
-            self._host.stop(line)
+        if line.answers:
+            with contextlib.suppress(LinkError):
+                self._host.stop(line)
         self._settle(time.perf_counter())
 
     def _hand_on(self, data: bytes, arrived_s: float) -> bool:

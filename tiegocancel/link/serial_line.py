@@ -22,10 +22,12 @@ class SerialLine:
     """One open port, a :class:`~tiegocancel.link.protocols.protocol.Line`; raise :class:`LinkError` for its faults.
 
     Where the system gives a descriptor (POSIX ports and sockets) it is waited on directly, because pyserial's own
-    ``read`` waits for a full buffer or its timeout. ``ended`` is never true: a port may come back.
+    ``read`` waits for a full buffer or its timeout. ``ended`` is never true: a port may come back; ``answers``: there
+    is a device to talk to.
     """
 
     ended = False
+    answers = True
 
     def __init__(self, port: str, options: LineOptions) -> None:
         import serial

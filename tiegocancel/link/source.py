@@ -23,6 +23,8 @@ __all__ = ["Limits", "LinkSource"]
 
 _TICK_S = 0.05
 """A source gives an empty chunk at least so often, so that who iterates hears an interruption and shows what is new."""
+_LONG_S = 1.0
+"""Who waits so long for a decision has to be told."""
 _JOIN_S = 10.0
 """More than a write to a dead device and the conversation at the end take."""
 
@@ -188,6 +190,11 @@ class LinkSource:
         ):
             if count:
                 said.append(f"{self.port}: {count:,} {what}")
+        if self.latency.max_s >= _LONG_S:
+            said.append(
+                f"{self.port}: events waited for up to {self.latency.max_s:.1f} s: processing fell behind. A longer "
+                "--step-us, --no-controls, or --policy drop-oldest with a smaller --queue keeps it in time"
+            )
         if queue.blocked_s >= 0.1:
             said.append(f"{self.port}: processing fell behind; the reader waited for {queue.blocked_s:.1f} s (block)")
         return said

@@ -17,9 +17,12 @@ __all__ = ["StreamLine"]
 class StreamLine:
     """Bytes of a file or a pipe, a :class:`~tiegocancel.link.protocols.protocol.Line`; ``ended`` at their end.
 
+    ``answers`` is false, so that no conversation is held with it: it would eat the stream.
     ``-`` reads standard input, or writes standard output. A line is for reading or for writing: what a conversation
     writes to one that is read goes nowhere, and one that is written answers nothing.
     """
+
+    answers = False
 
     def __init__(self, name: str, *, writes: bool = False) -> None:
         self.port = {"-": "standard output" if writes else "standard input"}.get(name, name)

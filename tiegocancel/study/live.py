@@ -7,12 +7,12 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Protocol
 
+import numpy as np
+
 from tiegocancel.errors import TiegoCancelError
 from tiegocancel.events import Events
 from tiegocancel.interrupt import deferred_interrupt
-from tiegocancel.matching.canceller import Canceller, Decisions
-from tiegocancel.matching.config import CancelConfig
-from tiegocancel.motion.schedule import MotionSchedule
+from tiegocancel.matching.canceller import Decisions
 from tiegocancel.motion.trajectory import Trajectory
 from tiegocancel.study.feed import FixedMotion, MotionFeed, TrackedMotion
 from tiegocancel.study.one_pass import OnePass
@@ -20,7 +20,7 @@ from tiegocancel.study.prefilter import Prefilter
 from tiegocancel.study.result import INTERRUPTED, RunResult
 from tiegocancel.study.settings import Settings
 
-__all__ = ["LiveSource", "Watcher", "compile_kernels", "run_live"]
+__all__ = ["LiveSource", "Watcher", "run_live", "warm_up"]
 
 _SETTLE_EVENTS = 1 << 16
 _SETTLE_S = 0.1
@@ -48,11 +48,28 @@ class Watcher(Protocol):
     def __call__(self, events: Events, decisions: Decisions | None, run: OnePass | None) -> None: ...
 
 
-def compile_kernels(config: CancelConfig, *, width: int, height: int) -> None:
-    """Compile what a run needs, so that the first events of a stream do not wait for it."""
-    for track_source in (True, False):
-        motion = MotionSchedule.still()
-        Canceller(config, motion, width=width, height=height, track_source=track_source).prepare()
+def warm_up(settings: Settings, motion: Trajectory | MotionFeed, *, width: int, height: int) -> None:
+    """Compile and import what a run on a sensor of this size needs, so that the first events do not wait for it.
+
+    ``motion`` is one of the kind that the run will have; it is used up.
+    """
+    rng = np.random.default_rng(0)
+    radius, angle = 0.45 * min(width, height) * rng.random(40), 2 * np.pi * rng.random(40)
+    t = np.arange(0, 80_000, 400)
+    turned = angle + 8.0 * t[:, None] * 1e-6
+    x, y = (
+        np.floor(side / 2 + radius * wave(turned)).astype(int).ravel()
+        for side, wave in ((width, np.cos), (height, np.sin))
+    )
+    few = Events(np.repeat(t, 40), x, y, np.tile(np.arange(40) % 2, len(t)), width, height)
+    feed = FixedMotion(motion) if isinstance(motion, Trajectory) else motion
+    for events in Prefilter(settings.filter).kept([few]):
+        run = OnePass(settings, feed, events[:1], None, None, live=True) if len(events) else None
+        for chunk in (events[:4000], events[4000:]):
+            if run is not None and len(chunk):
+                run.process(chunk)
+        for control in run.controls.values() if run is not None else ():
+            control.finish()
 
 
 def run_live(
