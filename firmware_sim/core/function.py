@@ -100,8 +100,8 @@ def _find(rule: Rule, state: State, column: int, row: int, now: int, writing: in
 
 
 @jit
-def _write(rule: Rule, state: State, h: int, column: int, row: int, slot: int, due: int, now: int) -> None:
-    """Expect in a bin what a ring entry predicts over horizon ``h``."""
+def _write(rule: Rule, state: State, h: int, column: int, row: int, slot: int, due: int, now: int) -> Any:
+    """Expect in a bin what a ring entry predicts over horizon ``h``; return the cell."""
     cell = _find(rule, state, column, row, now, 1)
     name, p = row * rule.bins_x + column, state.ring_p[slot]
     is_open = _age_left(rule, state, cell, now) >= 0
@@ -121,6 +121,13 @@ def _write(rule: Rule, state: State, h: int, column: int, row: int, slot: int, d
         state.cell_bin[cell], state.cell_p[cell] = name, p
         state.cell_horizons[cell], state.cell_uses[cell], state.cell_support[cell] = 1 << h, 1, support
     state.cell_due[cell] = due
+    return cell
+
+
+@jit
+def _moves(rows: Int64s, at: int, x: int, y: int) -> Any:
+    """Return one coordinate of a displacement with 16 fractional bits."""
+    return rows[at] * x + rows[at + 1] * y + rows[at + 2]
 
 
 @jit
@@ -156,7 +163,11 @@ def _drain(rule: Rule, state: State, now: int, ops: NDArray[np.int64]) -> Any:
             count += 1
             if made and not late:
                 state.counts[_WRITES] += 1
-                _write(rule, state, h, column, row, slot, due, now)
+                cell = _write(rule, state, h, column, row, slot, due, now)
+                if rule.lines:
+                    fine = 16 - rule.fraction_bits
+                    state.cell_x[cell] = ((x << 16) + _moves(rule.rows, at, x, y) + 32768) >> fine
+                    state.cell_y[cell] = ((y << 16) + _moves(rule.rows, at + 3, x, y) + 32768) >> fine
     return count
 
 
@@ -166,6 +177,16 @@ def _shift_squared(rule: Rule, at: int, x: int, y: int) -> Any:
     dx = min(abs(_along(rule.rows, at, x, x, y) - x), _FARTHEST)
     dy = min(abs(_along(rule.rows, at + 3, y, x, y) - y), _FARTHEST)
     return dx * dx + dy * dy
+
+
+@jit
+def _off_line(rule: Rule, place: int, fine: int, moves: int, since: int) -> Any:
+    """Tell whether one coordinate lies off the line along which a prediction has moved for ``since`` ticks."""
+    bits = rule.fraction_bits
+    most = _FARTHEST << (bits + 1)
+    velocity = min(max(moves >> (15 - bits), -most), most)
+    residual = (place << (bits + 1)) - (2 * fine + 1 - (1 << bits))
+    return abs(residual * rule.horizon[0] - velocity * since) > rule.line_limit
 
 
 @jit
@@ -199,6 +220,12 @@ def _match(rule: Rule, state: State, now: int, x: int, y: int, p: int, row: int)
             continue
         if rule.dx[o] * rule.dx[o] + rule.dy[o] * rule.dy[o] > rule.reach[sign]:
             continue
+        if rule.lines:
+            since = rule.late[sign] - left
+            if _off_line(rule, x, state.cell_x[cell], _moves(rule.rows, row * 6, x, y), since) or _off_line(
+                rule, y, state.cell_y[cell], _moves(rule.rows, row * 6 + 3, x, y), since
+            ):
+                continue
         if nearest < 0:
             nearest = cell
         votes |= state.cell_horizons[cell]

@@ -58,6 +58,9 @@ class Rule(NamedTuple):
     dy: Int64s  # [window]
     offset_shift: Int64s  # [window] px², least shift at which each offset is looked at
     spreads: int
+    lines: int
+    fraction_bits: int
+    line_limit: int
     row_t: Int64s  # [rows] µs
     rows: Int64s  # [horizons · rows · 6]
 
@@ -82,6 +85,8 @@ class State(NamedTuple):
     cell_horizons: Int64s  # a bit for each, 0 is empty
     cell_uses: Int64s
     cell_support: Int64s
+    cell_x: Int64s  # place of the last prediction, with fraction_bits below the pixel; one cell where no line is asked
+    cell_y: Int64s
     counts: Int64s  # see COUNTS
     seen: Int64s  # [window] scratch: bins that a match has looked at
     row_hint: Int64s  # [horizons + 1] scratch: row of the schedule last used by each pointer, and by events
@@ -128,6 +133,9 @@ def lay_out_rule(
         dy=offsets[:, 1].copy(),
         offset_shift=np.array(config.spread_shifts_squared, np.int64),
         spreads=int(config.spreads),
+        lines=int(config.lines),
+        fraction_bits=config.fraction_bits,
+        line_limit=config.line_limit if config.lines else 0,
         row_t=np.array(row_t, np.int64),
         rows=np.array(rows, np.int64).reshape(-1),
     )
@@ -162,6 +170,8 @@ def lay_out_state(config: CancelConfig, *, width: int, height: int) -> State:
         cell_horizons=zeros(cells),
         cell_uses=zeros(cells),
         cell_support=zeros(cells),
+        cell_x=zeros(cells if config.lines else 1),
+        cell_y=zeros(cells if config.lines else 1),
         counts=zeros(len(COUNTS)),
         seen=zeros(max(len(config.offsets), 1)),
         row_hint=zeros(horizons + 1),

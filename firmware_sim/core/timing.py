@@ -8,7 +8,7 @@ R1 **Input FIFO.** An event that arrives in cycle ``A`` is dropped when ``input_
 R2 **Predict.** Events are taken in order, at ``P ≥ A + 1``, one every ``⌈4·maps / predict_multipliers⌉`` cycles, while
    fewer than ``map_depth + 1`` are between predict and issue at the start of the cycle. An event taken at ``P`` can
    issue from ``S = P + map_depth`` on. Where no motion is asked of events (``motion_at = gate`` without a gate that
-   spreads or a choice of horizons), predict is a register: one a cycle, ``S = P + 1``, two places.
+   spreads, a line or a choice of horizons), predict is a register: one a cycle, ``S = P + 1``, two places.
 R3 **Issue.** One operation a cycle, in program order, not before ``S``. After a pass that needs a place computed the
    next issue waits ``⌈4 / drain_multipliers⌉`` cycles. An entry can be passed from two cycles after the commit of the
    match that stored it. A match issues while fewer than ``output_depth`` matches are undecided or have left a residual
@@ -127,7 +127,7 @@ def lay_out_plan(core: CoreConfig, cancel: CancelConfig, *, scrub_cycles: int, l
     ways = 1 if cancel.set_bits is None else cancel.ways
     together = core.ways_per_read or ways
     read = -(-ways // together)
-    asks = cancel.motion_at == "event" or cancel.spreads or cancel.chooses
+    asks = cancel.motion_at == "event" or cancel.spreads or cancel.chooses or cancel.lines
     maps = len(cancel.horizons_us) if cancel.motion_at == "event" or cancel.chooses else 1
     stores_places = cancel.is_plain
     return Plan(

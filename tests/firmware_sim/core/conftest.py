@@ -61,6 +61,8 @@ def drawn_cancel(rng: np.random.Generator) -> CancelConfig:
         table["off_early_us"] = int(rng.integers(0, 10)) * tick
         table["off_late_us"] = int(rng.integers(0, 10)) * tick
         table["off_tolerance_px"] = float(rng.choice([0, 1, 2]))
+    if rng.random() < 0.3:
+        table["line_px"], table["fraction_bits"] = float(rng.choice([0.5, 1, 2.5])), int(rng.integers(0, 4))
     return CancelConfig(**table)
 
 
