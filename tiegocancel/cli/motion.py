@@ -73,10 +73,11 @@ def run(args: argparse.Namespace) -> int:
             notes += offset
         estimator = build_estimator(settings.estimate, width=reader.width, height=reader.height, gyro=gyro)
         prefilter = Prefilter(settings.filter)
-        with EstimateWriter(args.out) as writer, event_progress("estimating", None) as advance:
+        turns = settings.estimate.method == "gyro" and settings.estimate.calibration is not None
+        with EstimateWriter(args.out, turns=turns) as writer, event_progress("estimating", None) as advance:
             found = estimate_stream(prefilter.kept(reader), estimator, sink=writer.extend, progress=advance)
         three_axes: Trajectory | None = None
-        if settings.estimate.method == "gyro" and settings.estimate.calibration is not None and gyro is not None:
+        if turns and gyro is not None:
             camera = camera_motion(
                 settings.estimate,
                 gyro,

@@ -25,7 +25,8 @@ class MotionEstimate:
     the events as they are (residual sharpness; NaN where an estimator makes none). ``confident``: fit for use;
     otherwise ``doubt`` says why not in a few words. ``doubt`` may be given with ``confident`` too (a centre that is
     held). ``events_used`` of the ``events_seen`` in the window. ``window``: mean time in µs of the window's events and
-    ω of them alone, before any filter, which lags where ω swings; ``None`` where an estimator has none.
+    ω of them alone, before any filter, which lags where ω swings; ``None`` where an estimator has none. ``turn_rad_s``:
+    the camera's own turn about right, down and forward, where it is measured.
     """
 
     t_us: int
@@ -40,6 +41,7 @@ class MotionEstimate:
     events_used: int = 0
     events_seen: int = 0
     window: tuple[int, float] | None = None
+    turn_rad_s: tuple[float, float, float] | None = None
 
     @property
     def has_center(self) -> bool:

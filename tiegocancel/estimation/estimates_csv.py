@@ -13,7 +13,7 @@ from typing import Self
 from tiegocancel.estimation.estimate import MotionEstimate
 from tiegocancel.motion.csv_table import time_cell
 
-__all__ = ["COLUMNS", "EstimateWriter"]
+__all__ = ["COLUMNS", "TURNS", "EstimateWriter"]
 
 COLUMNS = (
     "timestamp",
@@ -30,6 +30,9 @@ COLUMNS = (
 )
 """Columns of the file: time in s, px, rad/s, rad/s², 0 or 1 for ``confident``, and words."""
 
+TURNS = ("omega_x_rad_s", "omega_y_rad_s", "omega_z_rad_s")
+"""Columns of a camera that turns about three axes: its own turn about right, down and forward."""
+
 
 class EstimateWriter:
     """Write a row for each estimate; the file reads back with ``RotationTrajectory.from_csv``.
@@ -39,16 +42,18 @@ class EstimateWriter:
        every row that was written, and none torn. (A machine that dies may lose the last ones.)
     3. :meth:`close`, or leaving a ``with`` block, closes the file.
 
+    With ``turns`` rows have :data:`TURNS` too, and the file serves ``--motion`` with ``--calibration``.
     A centre that never was known and a sharpness that was not made are empty cells; an unknown deviation is ``inf``.
     Raise ``ValueError`` when times do not increase strictly, ``OSError`` from the file system.
     """
 
-    def __init__(self, path: str | Path) -> None:
+    def __init__(self, path: str | Path, *, turns: bool = False) -> None:
         self.path = Path(path)
+        self._turns = turns
         self.count = 0
         self._last_us: int | None = None
         self._file = self.path.open("wb", buffering=0)  # unbuffered: a row is one write
-        self._append(COLUMNS)
+        self._append((*COLUMNS, *TURNS) if turns else COLUMNS)
 
     def __enter__(self) -> Self:
         return self
@@ -71,7 +76,8 @@ class EstimateWriter:
         for estimate in estimates:
             if self._last_us is not None and estimate.t_us <= self._last_us:
                 raise ValueError(f"t_us must increase strictly: {estimate.t_us} µs after {self._last_us} µs")
-            self._append(_cells(estimate))
+            turn = estimate.turn_rad_s or (math.nan,) * len(TURNS)
+            self._append(_cells(estimate) + [_number(axis) for axis in turn if self._turns])
             self._last_us = estimate.t_us
             self.count += 1
 

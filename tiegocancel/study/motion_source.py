@@ -12,7 +12,7 @@ from tiegocancel.estimation.diagnosis.diagnosis import Diagnosis
 from tiegocancel.estimation.source import trajectory_from
 from tiegocancel.events import Events
 from tiegocancel.motion.camera import CameraTrajectory
-from tiegocancel.motion.camera_csv import is_camera_file, read_camera
+from tiegocancel.motion.camera_csv import names_turns, read_camera
 from tiegocancel.motion.rotation import RotationTrajectory
 from tiegocancel.motion.schedule_file import is_schedule_file, read_schedule
 from tiegocancel.motion.trajectory import Trajectory
@@ -51,12 +51,12 @@ def open_motion(settings: Settings, *, sample: Callable[[], Events], width: int,
         return Found(_estimated(settings, source.lower(), width, height))
     if estimate.gyro is not None:
         raise ConfigError(f"--gyro {estimate.gyro}: serves --motion track and --motion gyro, not {source}")
-    turns = _is_file(source) and not is_schedule_file(source) and is_camera_file(source)
-    if estimate.calibration is not None and not turns:
+    turns = names_turns(source) if _is_file(source) and not is_schedule_file(source) else "no"
+    if estimate.calibration is not None and turns == "no":
         raise ConfigError(
             f"--calibration {estimate.calibration}: serves --motion gyro and CSV files of three axes, not {source}"
         )
-    if turns:
+    if turns == "only" or estimate.calibration is not None:
         return Found(FixedMotion(_turning_camera(settings, source, width, height)))
     if is_schedule_file(source):
         if settings.motion.path == "float" or settings.motion.refine or settings.motion.interpolation != "file":
@@ -76,6 +76,8 @@ def open_motion(settings: Settings, *, sample: Callable[[], Events], width: int,
             raise InputError(source, "", f"cannot be run backwards, as a control is: {error}") from None
     trajectory: Trajectory
     trajectory, fit = trajectory_from(source, sample=sample, width=width, height=height)
+    if turns == "too":
+        trajectory = trajectory.noted("the file has turns about three axes too; --calibration makes use of them")
     if settings.motion.interpolation != "file":
         trajectory = _interpolated(trajectory, settings)
     if not settings.motion.refine:
@@ -122,8 +124,8 @@ def _turning_camera(settings: Settings, source: str, width: int, height: int) ->
         )
     if settings.motion.refine:
         raise ConfigError(f"--refine: {source} is no rotation, and only rotations are refined")
-    if settings.motion.interpolation not in ("file", "linear"):
-        raise ConfigError(f"--motion-interpolation {settings.motion.interpolation}: {source} is linear between rows")
+    if settings.motion.interpolation != "file":
+        raise ConfigError(f"--motion-interpolation {settings.motion.interpolation}: serves files of rotations")
     undistorted = settings.read.undistort is not None
     intrinsics = intrinsics_of(settings.estimate, width=width, height=height, undistorted=undistorted)
     return read_camera(source, intrinsics, width=width, height=height).reported(settings.cancel.horizon_us)

@@ -151,6 +151,13 @@ def test_a_gyroscope_alone_needs_no_structure_and_with_calibration_gives_three_a
     assert len(lines) == len(set(lines))
     assert abs(read_schedule("m.schedule").coefficients[:, 3]).max() > 1000  # it turns
     assert {row["center_x"] for row in table("motion.csv")} == {"79.5"}
+    # The rows serve a run as well, about all three axes.
+    shared = ("--horizon-us", "8000", "--no-figures", "--calibration", lens)
+    numbers = []
+    for number, source in enumerate((("--motion", "gyro", "--gyro", gyro), ("--motion", "motion.csv"))):
+        assert invoke("run", rolling, *source, *shared, "--out", f"run{number}", "--json")[0] == 0
+        numbers.append(json.loads(Path(f"run{number}", "manifest.json").read_text(encoding="utf-8"))["results"])
+    assert numbers[0]["cancellation_ratio"] == pytest.approx(numbers[1]["cancellation_ratio"], abs=0.01)
 
 
 @pytest.mark.parametrize(("count", "rows"), [(1, 0), (8_000, 11)])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tiegocancel.errors import InputError
-from tiegocancel.motion.camera_csv import is_camera_file, read_camera
+from tiegocancel.motion.camera_csv import names_turns, read_camera
 from tiegocancel.motion.intrinsics import CameraIntrinsics
 from tiegocancel.motion.trajectory_csv import read_motion
 
@@ -43,13 +43,20 @@ def test_the_prediction_is_that_of_the_camera(write):
 
 
 def test_each_kind_of_file_is_told_from_the_others(write, tmp_path):
-    assert is_camera_file(write(HEADER + "0,0,0,1\n"))
-    assert not is_camera_file(write("timestamp,center_x,center_y,omega_rad_s\n0,1,2,3\n"))
+    assert names_turns(write(HEADER + "0,0,0,1\n")) == "only"
+    assert names_turns(write("timestamp,center_x,center_y,omega_rad_s\n0,1,2,3\n")) == "no"
     tracker = write("timestamp,center_x,center_y,omega_rad_s,omega_x_rad_s\n0,1,2,3,4\n")
-    assert not is_camera_file(tracker)
+    assert names_turns(tracker) == "too"
     assert read_motion(tracker).omega_rad_s.tolist() == [3.0]
-    assert not is_camera_file(write("nothing\n"))
-    assert not is_camera_file(tmp_path / "absent.csv")
+    assert names_turns(write("nothing\n")) == "no"
+    assert names_turns(tmp_path / "absent.csv") == "no"
+
+
+def test_estimates_hold_from_their_own_time_on(write):
+    header = HEADER.replace("\n", ",omega_dot_rad_s2\n")
+    camera = read_camera(write(header + "0,0,0.1,1,0\n0.01,0,0.2,-1,0\n"), LENS)
+    assert camera.interpolation == "causal"
+    assert camera.at(np.array([9_999]))[0].tolist() == [0.0, 0.1, 1.0]
 
 
 @pytest.mark.parametrize(

@@ -159,7 +159,12 @@ def test_refining_corrects_what_the_residuals_show(files: Path, turning_scene: E
         ("turn.csv", {}, {"calibration": "lens.toml"}, r"--calibration lens\.toml: serves .* not turn\.csv"),
         ("camera.csv", {}, {}, r"--motion camera\.csv: turns about three axes .* --calibration"),
         ("camera.csv", {"refine": True}, {"calibration": "lens.toml"}, r"--refine: camera\.csv is no rotation"),
-        ("camera.csv", {"interpolation": "spline"}, {"calibration": "lens.toml"}, r"camera\.csv is linear"),
+        (
+            "camera.csv",
+            {"interpolation": "spline"},
+            {"calibration": "lens.toml"},
+            r"--motion-interpolation spline: serves files of rot",
+        ),
         ("track", {}, {"calibration": "lens.toml", "gyro": "gyro.csv"}, r"--calibration lens\.toml: serves"),
         ("track", {}, {"gyro": "gyro.csv", "gyro_axes": "x,x,z"}, r"--gyro-axes: .* 'x,x,z'"),
         ("track", {}, {"window_us": 7}, r"\[estimate\] window_us"),

@@ -72,6 +72,7 @@ class GyroEstimator:
     def _row(self, batch: slice) -> MotionEstimate:
         times, rates = self._samples.t_us[batch], self._samples.rate_rad_s[batch]
         bias, sigma, noise, doubt = self._bias(times, rates)
+        right, down, forward = (rates - bias).mean(axis=0).tolist()
         return MotionEstimate(
             t_us=int(times[-1]),
             center_px=self._center_px,
@@ -79,6 +80,7 @@ class GyroEstimator:
             center_sigma_px=self._center_sigma_px,
             omega_sigma_rad_s=math.hypot(sigma, noise / math.sqrt(len(times))),
             doubt=doubt,
+            turn_rad_s=(right, down, forward),
         )
 
     def _bias(
