@@ -54,6 +54,7 @@ class AlignedDecoder(ABC):
         self._outbox = Outbox(self.width, self.height, options)
         self._held = b""
         self._rows_at_once = _MOST_ROWS
+        self._undecided = -1
         self._in_step = True
 
     def feed(self, data: bytes) -> Events:
@@ -72,7 +73,10 @@ class AlignedDecoder(ABC):
 
     @abstractmethod
     def _fits(self, rows: NDArray[np.uint8]) -> NDArray[np.bool_]:
-        """Return which of ``rows`` [n, row_bytes] continue the stream, each behind the one before it."""
+        """Return which of ``rows`` [n, row_bytes] continue the stream, each behind the one before it.
+
+        Set ``_undecided`` to the row that only rows behind these can decide, −1 where there is none.
+        """
 
     @abstractmethod
     def _take(self, rows: NDArray[np.uint8], *, searched: bool) -> None:
@@ -93,6 +97,10 @@ class AlignedDecoder(ABC):
     def _is_wild(self, row: bytes) -> bool:
         """Tell whether ``row`` would change the state so much that it is looked at again, ``look_far_rows`` far."""
         return False
+
+    def _goes_on(self, rows: bytes) -> bool:
+        """Tell whether the rows behind the first go on from it, or rather from what was before."""
+        return True
 
     def _take_text(self, line: bytes) -> None:
         """Accept a line of text, its end included; a protocol without text never comes here."""
@@ -116,7 +124,7 @@ class AlignedDecoder(ABC):
             if sure:
                 self._accept(block[:sure], searched=False)
                 place += sure * self.row_bytes
-            if good == count:
+            if good == count or (good == self._undecided and not (final and count == rows)):
                 if count == rows:
                     break
                 self._rows_at_once = min(self._rows_at_once * 4, _MOST_ROWS)
@@ -140,15 +148,18 @@ class AlignedDecoder(ABC):
         """Take the first step of the cheapest reading from ``place``; return its length, 0 to wait for more bytes."""
         if self._waits(data, place):
             return 0
-        kind: Kind = "junk"
-        length = 1
-        for rows in (self.look_rows, self.look_far_rows):
-            end = place + rows * self.row_bytes
-            if len(data) < end and not final:
+        end = place + self.look_rows * self.row_bytes
+        if len(data) < end and not final:
+            return 0
+        kind, length = self._cheapest(data[: end + 256], place, min(end, len(data)))
+        if kind == "row" and self._is_wild(data[place : place + length]):
+            end = place + self.look_far_rows * self.row_bytes
+            if len(data) < end:
+                # Not even a silent line decides this.
                 return 0
-            kind, length = self._cheapest(data[: end + 256], place, min(end, len(data)))
-            if kind != "row" or not self._is_wild(data[place : place + length]):
-                break
+            kind, length = self._cheapest(data[: end + 256], place, end)
+        if kind == "row" and not self._goes_on(data[place:end]):
+            kind, length = "junk", self.row_bytes
         if kind == "row":
             self._accept(np.frombuffer(data, np.uint8, length, place).reshape(1, length), searched=True)
         elif kind == "text":

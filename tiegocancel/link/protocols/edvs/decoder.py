@@ -16,12 +16,12 @@ from tiegocancel.link.protocols.options import ProtocolOptions
 
 __all__ = ["EdvsDecoder"]
 
-_PLAIN_STEP_US = 4096
-"""A step up to this is taken as it comes; a larger one, or one back, is looked into."""
+_PLAIN_STEP_US = {0: 0, 2: 4096, 3: 16_384, 4: 16_384}
+"""A step up to this, by the bytes of the stamp, is taken as it comes; a larger one, or one back, is looked into."""
 _PLACE_BITS, _ANY_BITS = 15.0, 8.0
 """What place and polarity cost, and any stamp at most above its own bits."""
-_JUMP_BITS, _RESTART_BITS = 48.0, 24.0
-"""What a step beyond the plausible costs above its own bits, forwards and back."""
+_PAUSE_BITS, _JUMP_BITS, _RESTART_BITS = 12.0, 48.0, 24.0
+"""What a step beyond the plain costs above its own bits, one beyond the plausible, and one back."""
 _PERIOD_BITS, _BACK_BITS = 14.0, 10.0
 """What it costs that a whole period passes within a few events, where real pauses do so too (E2); and that the step
 which completes it looks like a small one back."""
@@ -45,7 +45,7 @@ class EdvsDecoder(AlignedDecoder):
         self._stamp_bytes = stamp_bytes(options.edvs_format)
         self.row_bytes = 2 + self._stamp_bytes
         self._period_us = 1 << (8 * self._stamp_bytes)
-        self._plain_us = min(_PLAIN_STEP_US, options.max_jump_us, self._period_us - 1)
+        self._plain_us = min(_PLAIN_STEP_US[self._stamp_bytes], options.max_jump_us)
         self._stamp: int | None = None
         self._time_us = 0
         self._recent: list[int] = []
@@ -129,8 +129,10 @@ class EdvsDecoder(AlignedDecoder):
         elapsed_us += step_us
         if step_us > self.options.max_jump_us:
             bits += _RESTART_BITS if step_us > self._period_us // 2 else _JUMP_BITS
+        elif self._period_us > self.options.max_jump_us:
+            bits += _PAUSE_BITS if step_us > self._plain_us else 0.0
         elif elapsed_us >= self._period_us:
-            bits += _PERIOD_BITS + (_BACK_BITS if step_us >= self._period_us - _PLAIN_STEP_US else 0.0)
+            bits += _PERIOD_BITS + (_BACK_BITS if step_us >= self._period_us - self._plain_us else 0.0)
             # Of many pauses in a row only the first is held against them.
             elapsed_us -= 1 << 40
         return [("row", self.row_bytes, bits, (stamp, elapsed_us))]
@@ -155,6 +157,19 @@ class EdvsDecoder(AlignedDecoder):
             return False
         step_us = (int.from_bytes(row[2:], "big") - self._stamp) & (self._period_us - 1)
         return step_us > min(self.options.max_jump_us, self._period_us // 2)
+
+    def _goes_on(self, rows: bytes) -> bool:
+        if self._stamp is None or self._period_us <= self.options.max_jump_us:
+            return True
+        whole = len(rows) // self.row_bytes * self.row_bytes
+        block = np.frombuffer(rows[:whole], np.uint8).reshape(-1, self.row_bytes)
+        # The last event may be ahead itself, by what passes as plain.
+        steps = (self._stamps(block) - self._stamp + self._plain_us) & (self._period_us - 1)
+        if steps[0] <= 2 * self._plain_us:
+            return True
+        # Two rows that lie between the last event and this one say that it is this one which was spoilt.
+        between = (block[1:, 0] >= 0x80) & (steps[1:] < steps[0])
+        return int(np.count_nonzero(between)) < 2
 
     def _take_text(self, line: bytes) -> None:
         text = line.decode("ascii").strip()
