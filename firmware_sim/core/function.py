@@ -26,6 +26,7 @@ OP_FIELDS = 8
 
 _COUNT_SUPPRESSED, _PREDICTED, _OUTSIDE, _OVERFLOW, _OVERWRITTEN, _HIGH, _STILL = 1, 2, 3, 4, 5, 6, 7
 _PASSES, _WRITES, _LATE, _READ, _TAKEN = 8, 9, 10, 11, 12
+_WAYS_MATCHED, _WAYS_WRITTEN, _CANDIDATES, _READ_TO_HIT, _WAYS_TO_HIT = 13, 14, 15, 16, 17
 _FARTHEST = 1 << 16
 
 
@@ -82,7 +83,9 @@ def _find(rule: Rule, state: State, column: int, row: int, now: int, writing: in
         return first
     name = row * rule.bins_x + column
     free, oldest, least = -1, first, 1 << 62
+    ways = _WAYS_WRITTEN if writing else _WAYS_MATCHED
     for cell in range(first, first + rule.ways):
+        state.counts[ways] += 1
         left = _age_left(rule, state, cell, now)
         if left < 0:
             if free < 0:
@@ -194,6 +197,7 @@ def _match(rule: Rule, state: State, now: int, x: int, y: int, p: int, row: int)
     """Return the nearest candidate cell, −1 without one, and the support of all candidates together."""
     shift = _shift_squared(rule, row * 6, x, y) if rule.spreads else 0
     nearest, votes, carried, looked = -1, 0, 0, 0
+    ways, to_hit, ways_to_hit = state.counts[_WAYS_MATCHED], 0, 0
     for o in range(len(rule.dx)):
         bx, by = x + rule.dx[o], y + rule.dy[o]
         if shift < rule.offset_shift[o] or bx < 0 or by < 0 or bx >= rule.width or by >= rule.height:
@@ -226,11 +230,14 @@ def _match(rule: Rule, state: State, now: int, x: int, y: int, p: int, row: int)
                 rule, y, state.cell_y[cell], _moves(rule.rows, row * 6 + 3, x, y), since
             ):
                 continue
+        state.counts[_CANDIDATES] += 1
         if nearest < 0:
-            nearest = cell
+            nearest, to_hit, ways_to_hit = cell, looked, state.counts[_WAYS_MATCHED] - ways
         votes |= state.cell_horizons[cell]
         carried = max(carried, state.cell_support[cell])
     state.counts[_READ] += looked
+    state.counts[_READ_TO_HIT] += looked if nearest < 0 else to_hit
+    state.counts[_WAYS_TO_HIT] += state.counts[_WAYS_MATCHED] - ways if nearest < 0 else ways_to_hit
     support = carried
     while votes:
         support += votes & 1

@@ -16,11 +16,15 @@ Int64s = NDArray[np.int64]
 COUNTS = (
     "events", "suppressed", "predicted", "outside", "overflow", "overwritten", "ring_high_water", "still",
     "passes", "writes", "late_passes", "cells_read", "uses_taken",
+    "ways_matched", "ways_written", "candidates", "cells_to_hit", "ways_to_hit",
 )  # fmt: skip
 """What ``State.counts`` holds, in this order: the canceller's counters, then the core's work.
 
 ``passes`` of entries by horizon pointers, ``writes`` of cells among them, ``late_passes`` whose gate had closed before
 an event came to pass them (they are never written), ``cells_read`` by matches, ``uses_taken`` from cells by hits.
+``ways_matched`` and ``ways_written``: cells of sets compared to find one bin's, by matches and by writes;
+``candidates`` of matches; ``cells_to_hit`` and ``ways_to_hit``: read up to the first candidate, else all:
+what a processor looks at that stops there.
 """
 
 
