@@ -80,6 +80,8 @@ def _check(args: argparse.Namespace, settings: Settings) -> None:
         raise ConfigError("--motion fit: looks at a recording beforehand; on a link use track, gyro, numbers or a file")
     if settings.motion.refine:
         raise ConfigError("--refine: looks at a recording beforehand, and a link has none")
+    if args.to is not None:
+        raise ConfigError(f"--to {args.to}: a device in the loop is sent a recording, not a live link")
     if args.residual_to == "-" and args.json:
         raise ConfigError("--residual-to -: standard output takes either the events or --json")
 

@@ -10,7 +10,21 @@ import sys
 from collections.abc import Sequence
 
 import tiegocancel
-from tiegocancel.cli import convert, demo, emulate, info, motion, plan, ports, record, replay, run, simulate, targets
+from tiegocancel.cli import (
+    convert,
+    demo,
+    emulate,
+    info,
+    link,
+    motion,
+    plan,
+    ports,
+    record,
+    replay,
+    run,
+    simulate,
+    targets,
+)
 from tiegocancel.errors import ConfigError, TiegoCancelError
 
 __all__ = ["main"]
@@ -76,6 +90,6 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"tiegocancel {tiegocancel.__version__}")
     parser.add_argument("-v", "--verbose", action="count", default=0, help="log more; twice: tracebacks")
     verbs = parser.add_subparsers(title="verbs", metavar="VERB", required=True)
-    for verb in (demo, run, plan, motion, simulate, info, convert, ports, record, replay, emulate, targets):
+    for verb in (demo, run, plan, motion, simulate, info, convert, ports, record, replay, emulate, link, targets):
         verb.add_parser(verbs)
     return parser

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from tiegocancel.files import EventReader
     from tiegocancel.study.settings import Settings
 
-__all__ = ["add_parser", "run"]
+__all__ = ["add_parser", "run", "sample_of"]
 
 SAMPLE_EVENTS = 1 << 22
 """``--motion fit`` looks at this many events from the beginning of the recording."""
@@ -61,6 +61,10 @@ def add_parser(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
     add_queue_options(group)
     group.add_argument("--residual-to", metavar="PORT", help="send what remains onward: a port, a file, - for stdout")
     group.add_argument("--residual-baud", type=int, metavar="B", help="bits/s of that port (as --baud)")
+    group.add_argument(
+        "--to", metavar="PORT", help="send the recording to a device that cancels, and compare its every decision"
+    )
+    group.add_argument("--to-baud", type=int, metavar="B", help="bits/s of that port (as --baud)")
     parser.set_defaults(run=run)
 
 
@@ -72,6 +76,10 @@ def run(args: argparse.Namespace) -> int:
         from tiegocancel.cli.live import run_link
 
         return run_link(args)
+    if args.to is not None:
+        from tiegocancel.cli.device_loop import run_to_device
+
+        return run_to_device(args)
     if args.residual_to is not None:
         raise ConfigError("--residual-to: needs --protocol, the protocol to speak there")
     settings = settings_from(args)
@@ -83,7 +91,7 @@ def run(args: argparse.Namespace) -> int:
     with open_events(source, **asdict(settings.read)) as reader:
         with event_progress("finding the motion", None) as advance:
             found = open_motion(
-                settings, sample=lambda: _sample(reader, settings, advance), width=reader.width, height=reader.height
+                settings, sample=lambda: sample_of(reader, settings, advance), width=reader.width, height=reader.height
             )
         session = Session(args, settings, title=source.name, inputs=[source, *motion_inputs(settings)])
         return session.run(
@@ -96,7 +104,7 @@ def run(args: argparse.Namespace) -> int:
         )
 
 
-def _sample(reader: EventReader, settings: Settings, advance: Callable[[Events], None]) -> Events:
+def sample_of(reader: EventReader, settings: Settings, advance: Callable[[Events], None]) -> Events:
     """Read the events that the fit may look at; a fault further on is left to the run itself."""
     from tiegocancel.errors import TiegoCancelError
     from tiegocancel.events import Events

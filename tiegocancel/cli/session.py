@@ -20,11 +20,14 @@ from tiegocancel.errors import InputError
 from tiegocancel.estimation.contrast.fit import RotationFit
 from tiegocancel.events import Events
 from tiegocancel.files import EventWriter, open_writer
+from tiegocancel.link.device_loop import DeviceLoop
 from tiegocancel.link.source import LinkSource
+from tiegocancel.matching.canceller import Decisions
 from tiegocancel.study import INTERRUPTED, RunResult, Settings, Verdict, judge, run_stream
 from tiegocancel.study.feed import MotionFeed, TrackedMotion
-from tiegocancel.study.live import Watcher, run_live
+from tiegocancel.study.live import LiveSource, Watcher, run_live
 from tiegocancel.study.motion_source import Found
+from tiegocancel.study.one_pass import OnePass
 
 __all__ = ["Session"]
 
@@ -100,6 +103,28 @@ class Session:
             link.close()
         return self._finish(result, found, sink, link.notes(), link=link.to_json())
 
+    def run_with_device(
+        self,
+        source: LiveSource,
+        found: Found,
+        device: DeviceLoop,
+        *,
+        width: int,
+        height: int,
+        notes: list[str],
+    ) -> int:
+        """Run while a device decides the same events and is compared; return the exit code as :meth:`run`."""
+        self.folder.prepare()
+
+        def compare(events: Events, decisions: Decisions | None, run: OnePass | None) -> None:
+            if decisions is not None:
+                device.exchange(events, decisions.suppressed)
+
+        with self._residual_writer(width, height, False) as sink:
+            hand_on = None if sink is None else sink.write
+            result = run_live(source, self.settings, found.feed, sink=hand_on, watch=compare)
+        return self._finish(result, found, sink, notes, device=device.to_json())
+
     def _finish(
         self,
         result: RunResult | None,
@@ -108,7 +133,7 @@ class Session:
         notes: list[str],
         *,
         photograph: NDArray[np.float32] | None = None,
-        link: dict[str, Any] | None = None,
+        **extra: dict[str, Any],
     ) -> int:
         """Say what there is to say, write numbers, figures and report, and return the exit code."""
         if sink is not None:
@@ -119,7 +144,7 @@ class Session:
             sys.stderr.write(f"note: {note}\n")
         if result is None:
             raise InputError(self.title, "", "holds no events")
-        self._write(result, judge(result), found.fit, notes, photograph, link)
+        self._write(result, judge(result), found.fit, notes, photograph, extra)
         if result.fault is None:
             return 0
         sys.stderr.write(f"tiegocancel: {result.fault}\n")
@@ -158,7 +183,7 @@ class Session:
         fit: RotationFit | None,
         notes: list[str],
         photograph: NDArray[np.float32] | None,
-        link: dict[str, Any] | None,
+        extra: dict[str, dict[str, Any]],
     ) -> None:
         """Print the numbers, write the manifest, then figures and report: numbers first, in case drawing is cut."""
         from tiegocancel.report import draw_figures, write_page
@@ -166,8 +191,7 @@ class Session:
         numbers = result.to_json()
         numbers["verdict"] = {"grade": verdict.grade, "headline": verdict.headline, "reasons": list(verdict.reasons)}
         numbers["notes"] = [*notes, *result.trajectory.notes, *numbers["notes"]]
-        if link is not None:
-            numbers["link"] = link
+        numbers |= extra
         if fit is not None:
             numbers["motion"] |= {"confident": fit.confident, "contrast_gain": fit.contrast_gain}
         self.folder.write_manifest(self.settings, numbers)
@@ -184,5 +208,5 @@ class Session:
         else:
             # Standard output may carry the residual events.
             talk = sys.stderr if getattr(self.args, "residual_to", None) == "-" else sys.stdout
-            said = "" if link is None else link_text(link)
+            said = link_text(extra["link"]) if "link" in extra else ""
             talk.write(summary_text(result, verdict) + said + f"report: {page}\n")

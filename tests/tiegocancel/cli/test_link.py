@@ -240,3 +240,52 @@ def test_emulate_and_run_talk_to_each_other(recording: Path, events: Events, tmp
     assert device.returncode == 0
     assert said.decode().startswith("/dev/pts/")
     assert not name.is_symlink()
+
+
+@pytest.mark.parametrize("horizon_us", [8000, 7000])
+def test_a_device_in_the_loop_is_compared_with_the_golden_model(
+    recording: Path, tmp_path: Path, horizon_us: int
+) -> None:
+    """A device made with the same settings agrees; one made with another horizon is caught, and the event named."""
+    name = tmp_path / "core0"
+    size = ["--width", SIDE, "--height", SIDE]
+    device = started("emulate", "--protocol", "framed", "--canceller", "oracle", *size, "--motion", MOTION,
+                     "--horizon-us", 8000, "--symlink", name)  # fmt: skip
+    try:
+        deadline = time.monotonic() + 30.0
+        while not name.exists():
+            assert time.monotonic() < deadline
+            time.sleep(0.02)
+        host = started("run", recording, "--to", name, "--motion", MOTION, "--horizon-us", horizon_us, "--no-figures",
+                       "--json", "--out", tmp_path / "out")  # fmt: skip
+        said, talk = host.communicate(timeout=60.0)
+    finally:
+        device.send_signal(signal.SIGINT)
+        device.communicate(timeout=10.0)
+    found = json.loads(said)["device"]
+    assert found["compared"] == found["sent"] == len(read_events(recording))
+    if horizon_us == 8000:
+        assert (host.returncode, found["different"]) == (0, 0), talk.decode()
+    else:
+        assert host.returncode == 1
+        assert found["different"] > 0
+        assert found["first_difference"] in talk.decode()
+
+
+def test_the_budget_of_a_line_is_in_bits(
+    recording: Path, events: Events, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    figure = tmp_path / "link.png"
+    flags = [recording, "--protocol", "edvs", "--baud", 921600, "--motion", MOTION]
+    found = run_json(capsys, "link", *flags, "--figure", figure, "--json")
+    assert found["before"]["bytes"] == 5 * len(events)
+    assert found["before"]["events"] == len(events)
+    assert found["after"]["bytes"] < 0.5 * found["before"]["bytes"]
+    assert found["bits_saved"] == 1 - found["after"]["bytes"] / found["before"]["bytes"]
+    assert found["before"]["utilisation"] == pytest.approx(5 * len(events) / 0.2999 / 92_160, rel=1e-3)
+    assert set(found["controls"]) == {"zero_motion", "reversed_motion", "time_shuffled"}
+    assert figure.read_bytes().startswith(b"\x89PNG")
+    assert main([str(word) for word in ["link", *flags]]) == 0
+    said = capsys.readouterr().out
+    assert "edvs at 921,600 baud: 92,160 bytes/s" in said
+    assert "zero motion" in said
