@@ -24,7 +24,7 @@ _LONGEST_TURN_RAD = 1.5
 _LEAST_MOVE_PX, _DOUBTED_MOVE_PX = 6.0, 5.0
 _MOST_MOVE_PX = 120.0
 _LEAST_CORRELATION = 0.25
-_WORST_PX = 1.0
+_WORST_PX, _WORST_SMALL_PX = 1.0, 2.5
 _LEAST_KEPT = 0.15
 _LEAST_SUPPORT = 0.25
 _UNSURE_PX = 2.0
@@ -283,7 +283,7 @@ class RotationTracker:
         return (
             ascent.converged
             and ascent.correlation >= _LEAST_CORRELATION
-            and worst_px <= _WORST_PX
+            and worst_px <= (_WORST_PX if ascent.support >= SMALL_SUPPORT else _WORST_SMALL_PX)
             and ascent.kept_share >= _LEAST_KEPT
             and found.support >= _LEAST_SUPPORT * self._usual.support
             and abs(ascent.twist.omega_rad_s) <= self.config.max_omega_rad_s

@@ -127,7 +127,9 @@ def test_stop_is_told_within_a_window_and_the_start_is_followed(mover):
     go = [row for k, row in enumerate(rows) if k > 40 and (omega[k - 3 : k + 1] == 3.6).all()]
     assert len(go) >= 5
     assert all(row.confident for row in go)
-    assert [row.omega_rad_s for row in go] == pytest.approx([3.6] * len(go), abs=0.1)
+    # The first of them overshoots, because it was sped up to until 30 ms ago.
+    assert go[0].omega_rad_s == pytest.approx(3.6, abs=0.15)
+    assert [row.omega_rad_s for row in go[1:]] == pytest.approx([3.6] * (len(go) - 1), abs=0.05)
 
 
 def test_fit_of_the_real_disc(recording):
