@@ -16,6 +16,8 @@ from tiegocancel.errors import ConfigError
 if TYPE_CHECKING:
     from tiegocancel.estimation.inertial.live import LiveGyro
     from tiegocancel.events import Events
+    from tiegocancel.link.live_view import LiveView
+    from tiegocancel.link.source import LinkSource
     from tiegocancel.study.motion_source import Found
     from tiegocancel.study.settings import Settings
 
@@ -69,7 +71,18 @@ def run_link(args: argparse.Namespace) -> int:
             sinks.append(stack.enter_context(forward).write)
         inputs = [file for file in [Path(args.source), *motion_inputs(settings)] if file.is_file()]
         session = Session(args, settings, title=args.source, inputs=inputs)
-        return session.run_link(link, found, width=width, height=height, sinks=sinks)
+        view = None if args.view is None and not args.live else stack.enter_context(_view(args, link))
+        return session.run_link(link, found, width=width, height=height, sinks=sinks, watch=view)
+
+
+def _view(args: argparse.Namespace, link: LinkSource) -> LiveView:
+    """Return the view: in a window where there is a display, otherwise in the terminal."""
+    from tiegocancel.link.live_view import LiveView
+    from tiegocancel.link.screen_process import ScreenProcess
+    from tiegocancel.link.window_screen import has_display
+
+    in_window = args.view == "window" or (args.view in (None, "auto") and has_display())
+    return LiveView(ScreenProcess(f"tiegocancel.link.{'window' if in_window else 'terminal'}_screen"), link)
 
 
 def _check(args: argparse.Namespace, settings: Settings) -> None:

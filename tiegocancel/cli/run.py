@@ -59,6 +59,10 @@ def add_parser(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
     group = add_protocol_options(parser)
     add_line_options(group)
     add_queue_options(group)
+    group.add_argument("--live", action="store_true", help="show before and after, rates, ratios and latency meanwhile")
+    group.add_argument(
+        "--view", choices=("auto", "terminal", "window"), help="where --live shows it (auto: a window on a display)"
+    )
     group.add_argument("--residual-to", metavar="PORT", help="send what remains onward: a port, a file, - for stdout")
     group.add_argument("--residual-baud", type=int, metavar="B", help="bits/s of that port (as --baud)")
     group.add_argument(
@@ -76,6 +80,8 @@ def run(args: argparse.Namespace) -> int:
         from tiegocancel.cli.live import run_link
 
         return run_link(args)
+    if args.live or args.view is not None:
+        raise ConfigError("--live: shows a live link; a recording has its report")
     if args.to is not None:
         from tiegocancel.cli.device_loop import run_to_device
 
