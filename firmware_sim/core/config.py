@@ -38,7 +38,7 @@ class CoreConfig:
     Raise ``ValueError`` with field, rule and value.
     """
 
-    input_depth: int = 64
+    input_depth: int = 512
     output_depth: int = 64
     lookup: Lookup = "serial"
     ways_per_read: int = 0
