@@ -65,8 +65,7 @@ def state_bits(config: CancelConfig, *, width: int, height: int, time_bits: int 
       **T needs 2^T > G, and a sweep that looks at every cell once in any** ``2^T − G`` **ticks and empties the closed
       ones hides every alias**. Emptying them shows in no decision and no count: closed is closed, for time does not go
       back. Of open ways the one due first has the least ``r``. The default ``T`` leaves the sweep a quarter of ``G``.
-    - Where OFF has gates of its own, a cell's ``late`` is that of its polarity, ``G`` takes the wider of each, and an
-      event also asks ``r ≤ early + late`` of that polarity.
+    - Where OFF has a late gate of its own, a cell's ``late`` is that of its polarity, and ``G`` takes the wider one.
     - Of an entry the device must know its age, from 0 to ``A = Δ_n + late``; one older is past every gate, and a
       pointer for each horizon, moved by the clock, tells where those end. That takes ``2^R > A + 1`` in every entry or,
       entries being in order, the place where each of ``A + 1`` ticks begins; the smaller one is counted. The tick

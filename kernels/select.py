@@ -110,10 +110,8 @@ def _kernel(horizons, ways, at_gate, chooses, spreads, splits, lines):
         height: ti.i64,
         tick_bits: ti.i32,
         horizon: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [horizons] ticks, rising
-        early: ti.i64,  # ticks, the wider of the next two
-        off_early: ti.i64,  # ticks, of OFF predictions
-        on_early: ti.i64,  # ticks
-        off_late: ti.i64,  # ticks
+        early: ti.i64,  # ticks
+        off_late: ti.i64,  # ticks, of OFF predictions
         on_late: ti.i64,  # ticks
         reaches: ti.types.ndarray(dtype=ti.i32, ndim=1),  # [2] px², of the gate in space
         flip: ti.i32,  # 0 opposite, 1 equal
@@ -160,6 +158,7 @@ def _kernel(horizons, ways, at_gate, chooses, spreads, splits, lines):
         suppressed: ti.types.ndarray(dtype=ti.u8, ndim=1),  # [n] out
         source: ti.types.ndarray(dtype=ti.i64, ndim=1),  # [n] out
         used_horizon: ti.types.ndarray(dtype=ti.u8, ndim=1),  # [n] out
+        supports: ti.types.ndarray(dtype=ti.u8, ndim=1),  # [n] out
     ):
         ti.loop_config(serialize=True)
         for _ in range(1):  # one serial task
@@ -291,7 +290,7 @@ def _kernel(horizons, ways, at_gate, chooses, spreads, splits, lines):
                                 passes = blur == 1 or old_sign == (sign ^ flip)
                                 since = now - cell_time[cell]
                                 timely = since <= gate_of(off_late, on_late, old_sign)
-                                timely = timely and since >= -gate_of(off_early, on_early, old_sign)
+                                timely = timely and since >= -early
                                 if ti.static(splits):
                                     far = offsets[o, 0] * offsets[o, 0] + offsets[o, 1] * offsets[o, 1]
                                     passes = passes and far <= reaches[old_sign]
@@ -307,10 +306,11 @@ def _kernel(horizons, ways, at_gate, chooses, spreads, splits, lines):
                                         nearest = cell
                                     votes |= held
                                     carried = ti.max(carried, ti.cast(cell_sign[cell] >> 1, ti.i32))
-                                    searching = not (need == 1 and carry == 0)
+                                    searching = ti.static(horizons > 1) or not (need == 1 and carry == 0)
                 support = 0
                 if nearest >= 0:
                     support = carried + (votes & 1) + ((votes >> 1) & 1) + ((votes >> 2) & 1) + ((votes >> 3) & 1)
+                supports[i] = ti.cast(support, ti.u8)
                 hit = nearest >= 0 and support >= need
                 suppressed[i] = ti.cast(hit, ti.u8)
                 source[i] = ti.i64(-1)

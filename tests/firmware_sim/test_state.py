@@ -115,12 +115,9 @@ class NarrowStamps(SelectiveOracle):
 
     def _is_open(self, cell: Any, now: int) -> bool:
         late = self._late[cell.p]
-        return bool(cell.horizons) and self._left(cell, now, late) <= max(self._early) + late
+        return bool(cell.horizons) and self._left(cell, now, late) <= self._early + late
 
     def _passes(self, cell: Any, now: int, p: int) -> bool:
-        late = self._late[cell.p]
-        if self._left(cell, now, late) > self._early[cell.p] + late:
-            return False
         return self.config.polarity == "ignore" or (cell.p == p) == (self.config.polarity == "opposite")
 
     def _cell_for(self, at: Any, now: int) -> Any:
@@ -153,7 +150,6 @@ def crowd(seed: int) -> tuple[CancelConfig, Events]:
         more_horizons_us=(13,),
         early_us=int(rng.integers(0, 4)),
         late_us=int(rng.integers(0, 4)),
-        off_early_us=int(rng.integers(0, 4)) if rng.random() < 0.5 else None,
         off_late_us=int(rng.integers(0, 4)) if rng.random() < 0.5 else None,
         uses=int(rng.integers(0, 3)),
         carry=3,

@@ -55,12 +55,14 @@ class Decisions:
     """Decide a chunk: ``suppressed`` bool[n]; ``source`` int64[n] or ``None`` when it is not tracked.
 
     ``source`` is the index in the whole stream of the event whose prediction was used, −1 where there is none;
-    ``horizon`` uint8[n] which of several horizons that prediction was made for, ``None`` with one.
+    ``horizon`` uint8[n] which of several horizons that prediction was made for, ``None`` with one; ``support`` uint8[n]
+    the support ``S`` that each event met, suppressed or not, ``None`` from the kernel of the plain rule.
     """
 
     suppressed: NDArray[np.bool_]
     source: NDArray[np.int64] | None = None
     horizon: NDArray[np.uint8] | None = None
+    support: NDArray[np.uint8] | None = None
 
 
 class Canceller:
@@ -185,11 +187,12 @@ class Canceller:
         if len(events):
             self._check_order(events)
             self._last_us = int(events.t[-1])
-        suppressed, source, horizon = self._engine.run(events, self._schedules())
+        suppressed, source, horizon, support = self._engine.run(events, self._schedules())
         return Decisions(
             suppressed=suppressed.view(np.bool_),
             source=source if self.track_source else None,
             horizon=horizon if self.track_source else None,
+            support=support,
         )
 
     def _schedules(self) -> Schedules:

@@ -48,7 +48,7 @@ class CancelConfig:
       ``tolerance_px`` (thesis, eq. 5.5); both 0: it is ``tolerance_px`` everywhere.
     - ``line_px``: an event must lie so near, in x and in y, to the line along which its prediction moves through its
       gate in time; 0 asks for nothing. ``fraction_bits`` of the predicted place are kept for it below the pixel.
-    - ``off_early_us``, ``off_late_us`` and ``off_tolerance_px``: gates of OFF predictions, those of ON unless given.
+    - ``off_late_us`` and ``off_tolerance_px``: gates of OFF predictions, those of ON unless given.
 
     Raise ``ValueError`` with field, rule and value.
     """
@@ -76,7 +76,6 @@ class CancelConfig:
     spread_px: float = 0.0
     line_px: float = 0.0
     fraction_bits: int = 0
-    off_early_us: int | None = None
     off_late_us: int | None = None
     off_tolerance_px: float | None = None
 
@@ -94,7 +93,7 @@ class CancelConfig:
             ("fraction_bits", 0, 3),
         ):
             object.__setattr__(self, name, _whole(name, getattr(self, name), low, high))
-        for name in ("early_us", "late_us", "off_early_us", "off_late_us"):
+        for name in ("early_us", "late_us", "off_late_us"):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, _whole(name, getattr(self, name), 0, MAX_GATE_US))
         for name in ("tolerance_px", "least_shift_px", "choose_px", "spread_px", "line_px", "off_tolerance_px"):
@@ -123,7 +122,7 @@ class CancelConfig:
             )
         for name, value in (
             *(("horizon_us", horizon) for horizon in self.horizons_us),
-            *zip(("early_us", "off_early_us"), reversed(self.early_gates_us), strict=True),
+            ("early_us", self.early_gate_us),
             *zip(("late_us", "off_late_us"), reversed(self.late_gates_us), strict=True),
         ):
             if value % tick:
@@ -167,9 +166,8 @@ class CancelConfig:
 
     @property
     def early_gates_us(self) -> tuple[int, int]:
-        """How long before its predicted time an event may come, inclusive: of OFF and of ON predictions."""
-        on = self.tolerance_us if self.early_us is None else self.early_us
-        return on if self.off_early_us is None else self.off_early_us, on
+        """The early gate of OFF and of ON predictions: one and the same, see *OFF* in ``semantics.md``."""
+        return self.early_gate_us, self.early_gate_us
 
     @property
     def late_gates_us(self) -> tuple[int, int]:
@@ -179,8 +177,8 @@ class CancelConfig:
 
     @property
     def early_gate_us(self) -> int:
-        """The wider early gate: so long before its time a prediction moves to its cell."""
-        return max(self.early_gates_us)
+        """How long before its predicted time an event may come, inclusive; then a prediction moves to its cell."""
+        return self.tolerance_us if self.early_us is None else self.early_us
 
     @property
     def late_gate_us(self) -> int:
@@ -193,7 +191,7 @@ class CancelConfig:
         return (
             not self.more_horizons_us
             and (self.carry, self.need, self.uses, self.tick_bits, self.bin_bits) == (0, 1, 1, 0, 0)
-            and {*self.early_gates_us, *self.late_gates_us} == {self.tolerance_us}
+            and {self.early_gate_us, *self.late_gates_us} == {self.tolerance_us}
             and self.reaches_squared_px[0] == self.reaches_squared_px[1]
             and not self.spreads
             and not self.lines

@@ -53,7 +53,7 @@ class SelectiveEngine:
         capacity = int(rings.sum())
         self.counts: NDArray[np.int64] = np.zeros(8, np.int64)
         self._stored, self._passed = np.zeros(len(rings), np.int64), np.zeros(horizons, np.int64)
-        gates = zip(config.early_gates_us, config.late_gates_us, config.reaches_squared_px, strict=True)
+        gates = zip(config.late_gates_us, config.reaches_squared_px, strict=True)
         self._options = {
             "horizons": horizons,
             "ways": ways,
@@ -69,11 +69,8 @@ class SelectiveEngine:
             "tick_bits": tick,
             "horizon": np.array([horizon >> tick for horizon in config.horizons_us], np.int64),
             "early": config.early_gate_us >> tick,
-            **{
-                f"{name}_{side}": gate >> tick
-                for side, gates in (("early", config.early_gates_us), ("late", config.late_gates_us))
-                for name, gate in zip(("off", "on"), gates, strict=True)
-            },
+            "off_late": config.late_gates_us[0] >> tick,
+            "on_late": config.late_gates_us[1] >> tick,
             "reaches": np.array(config.reaches_squared_px, np.int32),
             "flip": int(config.polarity == "equal"),
             "blur": int(config.polarity == "ignore"),
@@ -124,13 +121,13 @@ class SelectiveEngine:
 
     def run(
         self, events: Events, schedules: Schedules
-    ) -> tuple[NDArray[np.uint8], NDArray[np.int64], NDArray[np.uint8]]:
-        """Decide a chunk; return suppressed uint8[n], source int64[n] and the horizon of that source uint8[n]."""
+    ) -> tuple[NDArray[np.uint8], NDArray[np.int64], NDArray[np.uint8], NDArray[np.uint8]]:
+        """Decide a chunk; return suppressed uint8[n], source int64[n], the horizon of that source and the support."""
         from tiegocancel.kernels.select import select
 
         count = len(events)
         suppressed, source = np.zeros(count, np.uint8), np.full(count, -1, np.int64)
-        used_horizon = np.zeros(count, np.uint8)
+        used_horizon, supports = np.zeros(count, np.uint8), np.zeros(count, np.uint8)
         select(
             **self._options,
             state={
@@ -146,6 +143,7 @@ class SelectiveEngine:
                 "suppressed": suppressed,
                 "source": source,
                 "used_horizon": used_horizon,
+                "supports": supports,
             },
         )
-        return suppressed, source, used_horizon
+        return suppressed, source, used_horizon, supports

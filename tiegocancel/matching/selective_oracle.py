@@ -58,9 +58,8 @@ class SelectiveOracle:
     ) -> None:
         self.config, self.motion, self.width, self.height = config, motion, width, height
         self._horizons = [horizon >> config.tick_bits for horizon in config.horizons_us]
-        self._early, self._late = (
-            [gate >> config.tick_bits for gate in gates] for gates in (config.early_gates_us, config.late_gates_us)
-        )  # of OFF and of ON predictions
+        self._early = config.early_gate_us >> config.tick_bits
+        self._late = [gate >> config.tick_bits for gate in config.late_gates_us]  # of OFF and of ON predictions
         # Every ring by the numbers under which its entries were stored; one ring unless events choose among horizons.
         self._rings: list[dict[int, _Entry]] = [{} for _ in config.ring_capacities]
         self._stored = [0] * len(self._rings)
@@ -89,20 +88,21 @@ class SelectiveOracle:
         maps = self._maps()
         suppressed = np.zeros(len(events), np.bool_)
         source = np.full(len(events), -1, np.int64)
-        horizon = np.zeros(len(events), np.uint8)
+        horizon, supports = np.zeros(len(events), np.uint8), np.zeros(len(events), np.uint8)
         for i in range(len(events)):
             t, x, y, p = int(events.t[i]), int(events.x[i]), int(events.y[i]), int(events.p[i])
             now = t >> self.config.tick_bits
             for h in range(len(self._horizons)):
                 self._drain(maps, h, now)
             first, support = self._match(maps, t, x, y, p)
+            supports[i] = support
             if first is not None and support >= self.config.need:
                 suppressed[i], source[i], horizon[i] = True, first.source, first.last
                 self._use(first)
                 self._counts["suppressed"] += 1
             self._remember(maps, _Entry(t, x, y, p, min(self.config.carry, support), self._counts["events"]))
             self._counts["events"] += 1
-        return Decisions(suppressed=suppressed, source=source, horizon=horizon)
+        return Decisions(suppressed=suppressed, source=source, horizon=horizon, support=supports)
 
     def _drain(self, maps: tuple[MotionSchedule | Trajectory, ...], h: int, now: int) -> None:
         """Move every prediction of horizon ``h`` whose gate has opened to its cell; pass those that are not made."""
@@ -111,7 +111,7 @@ class SelectiveOracle:
         while self._passed[h] < self._stored[which]:
             entry = ring[self._passed[h]]
             due = (entry.t_us >> self.config.tick_bits) + self._horizons[h]
-            if due - max(self._early) > now:
+            if due - self._early > now:
                 return
             if self.config.chooses or h == len(self._horizons) - 1:
                 del ring[self._passed[h]]
@@ -259,7 +259,7 @@ class SelectiveOracle:
 
     def _passes(self, cell: _Cell, now: int, p: int) -> bool:
         """Tell whether an event of polarity ``p`` may meet an open cell."""
-        if now < cell.due - self._early[cell.p]:
+        if now < cell.due - self._early:
             return False
         return self.config.polarity == "ignore" or (cell.p == p) == (self.config.polarity == "opposite")
 

@@ -115,7 +115,8 @@ class OnePass:
         started = time.perf_counter()
         decisions = self.canceller.process(chunk)
         if self.guard is not None:
-            decisions = replace(decisions, suppressed=self.guard.process(chunk, decisions.suppressed))
+            suppressed = self.guard.process(chunk, decisions.suppressed, decisions.support)
+            decisions = replace(decisions, suppressed=suppressed)
         self.seconds += time.perf_counter() - started
         self.pending.append((chunk, decisions))
         return decisions

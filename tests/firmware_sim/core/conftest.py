@@ -58,7 +58,6 @@ def drawn_cancel(rng: np.random.Generator) -> CancelConfig:
     if rng.random() < 0.3:
         table["spread_px"], table["spread_us"] = float(rng.choice([0, 1])), int(rng.integers(1, 30))
     if rng.random() < 0.3:
-        table["off_early_us"] = int(rng.integers(0, 10)) * tick
         table["off_late_us"] = int(rng.integers(0, 10)) * tick
         table["off_tolerance_px"] = float(rng.choice([0, 1, 2]))
     if rng.random() < 0.3:

@@ -65,7 +65,6 @@ from tiegocancel.matching.config import CancelConfig
         ({"fraction_bits": 2}, "fraction_bits needs line_px, and must be 0, not 2"),
         ({"off_tolerance_px": 65}, "off_tolerance_px must be a number from 0 to 64, not 65"),
         ({"off_late_us": 0.5}, "off_late_us must be an integer from 0 to 268435455, not 0.5"),
-        ({"off_early_us": 8000}, "early_us must be below horizon_us when the canceller is selective, not 8000"),
         (
             {"horizon_us": 8192, "tick_bits": 4, "tolerance_us": 16, "off_late_us": 20},
             "off_late_us must be whole ticks of 16 µs (tick_bits): 16 or 32, not 20",
@@ -100,7 +99,6 @@ def test_the_plain_rule_may_open_its_gate_before_its_event() -> None:
         {"spread_us": 5},
         {"spread_px": 1.0},
         {"line_px": 1.0},
-        {"off_early_us": 999},
         {"off_late_us": 0},
         {"off_tolerance_px": 1.0},
     ],
@@ -111,7 +109,7 @@ def test_each_parameter_leaves_the_plain_rule(table: dict[str, Any]) -> None:
 
 def test_defaults_written_out_are_the_plain_rule() -> None:
     assert CancelConfig(early_us=1000, late_us=1000, more_horizons_us=(), ways=2, least_shift_px=0).is_plain
-    assert CancelConfig(off_early_us=1000, off_late_us=1000, off_tolerance_px=2.0, choose_px=0, spread_us=0).is_plain
+    assert CancelConfig(off_late_us=1000, off_tolerance_px=2.0, choose_px=0, spread_us=0).is_plain
 
 
 def test_a_gate_that_spreads_asks_each_offset_for_its_shift() -> None:
@@ -127,8 +125,7 @@ def test_a_gate_that_spreads_asks_each_offset_for_its_shift() -> None:
 
 def test_gates_of_off_are_those_of_on_unless_given() -> None:
     config = CancelConfig(early_us=500, off_late_us=3000, off_tolerance_px=1.0)
-    assert (config.early_gates_us, config.late_gates_us) == ((500, 500), (3000, 1000))
-    assert (config.early_gate_us, config.late_gate_us) == (500, 3000)
+    assert (config.late_gates_us, config.late_gate_us, config.early_gate_us) == ((3000, 1000), 3000, 500)
     assert (config.reaches_squared_px, config.reach_squared_px) == ((1, 4), 4)
 
 

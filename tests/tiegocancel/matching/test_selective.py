@@ -100,8 +100,7 @@ def extended(seed: int) -> tuple[CancelConfig, Schedules, Events]:
     if spreads:
         table |= {"spread_us": int(rng.choice([0, 1, 5, 30])), "spread_px": float(rng.choice([0.5, 1.0, 1.5]))}
     if splits:
-        table |= {"off_early_us": int(rng.integers(0, 10)), "off_late_us": int(rng.integers(0, 10))}
-        table["off_tolerance_px"] = float(rng.choice([0, 1, 2, 3]))
+        table |= {"off_late_us": int(rng.integers(0, 10)), "off_tolerance_px": float(rng.choice([0, 1, 2, 3]))}
     if chooses == splits:
         table |= {"line_px": float(rng.choice([0.5, 1.0, 2.0, 8.0])), "fraction_bits": int(rng.integers(0, 4))}
     config = CancelConfig(**table)
@@ -120,6 +119,8 @@ def test_kernel_equals_the_plain_model(case: Any, seed: int, cuts: list[int]) ->
     parts = [canceller.process(events[first:last]) for first, last in pairwise(edges)]
     assert np.concatenate([part.suppressed for part in parts]).tolist() == wanted.suppressed.tolist()
     assert np.concatenate([part.source for part in parts]).tolist() == np.asarray(wanted.source).tolist()
+    if wanted.support is not None:
+        assert np.concatenate([part.support for part in parts]).tolist() == wanted.support.tolist()
     assert dict(canceller.counters) == dict(oracle.counters)
     assert canceller.pending == oracle.pending
     assert canceller.most_held == oracle.most_held

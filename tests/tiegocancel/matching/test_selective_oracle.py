@@ -377,9 +377,9 @@ def test_a_line_needs_a_schedule() -> None:
 
 
 def test_off_predictions_have_gates_of_their_own() -> None:
-    gates: dict[str, Any] = {"early_us": 3, "late_us": 20, "off_early_us": 8, "off_late_us": 5, "uses": 0}
-    for p, expected in ((1, [2, 3, 4]), (0, [1, 2, 3])):
-        assert hits(*((t, 5, 5, p) for t in (0, 92, 97, 105, 120)), **gates) == expected
+    gates: dict[str, Any] = {"early_us": 3, "late_us": 20, "off_late_us": 5, "uses": 0}
+    for p, expected in ((1, [2, 3, 4]), (0, [2, 3])):
+        assert hits(*((t, 5, 5, p) for t in (0, 96, 97, 105, 120)), **gates) == expected
     beside = [(0, 5, 5, 1), (0, 9, 5, 0), (100, 6, 5, 1), (100, 10, 5, 0)]
     assert hits(*beside, tolerance_px=1.0, off_tolerance_px=0.0) == [2]
     assert hits(*beside, tolerance_px=0.0, off_tolerance_px=1.0) == [3]
@@ -393,7 +393,6 @@ def test_off_predictions_have_gates_of_their_own() -> None:
 def test_a_window_always_open_and_gates_written_twice_change_nothing(seed: int) -> None:
     config, motion, events = case(seed)
     same = {
-        "off_early_us": config.early_gate_us,
         "off_late_us": config.late_gate_us,
         "off_tolerance_px": config.tolerance_px,
         "spread_px": config.tolerance_px,

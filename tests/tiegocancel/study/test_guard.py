@@ -24,14 +24,26 @@ QUICK = GuardConfig(enabled=True, window_events=64, window_us=5_000)
 
 
 def plain_guard(
-    config: GuardConfig, events: Events, hits: NDArray[np.bool_], still: NDArray[np.bool_]
+    config: GuardConfig,
+    events: Events,
+    hits: NDArray[np.bool_],
+    still: NDArray[Any],
+    support: NDArray[Any] | None = None,
+    levels: tuple[int, int] = (1, 1),
 ) -> tuple[list[bool], list[tuple[int, bool]]]:
-    """Apply the rule of the docstring, event by event; ``still`` are the hits of zero motion, in order."""
-    opened, n, d, t0, taken = False, 0, 0, 0, 0
+    """Apply the rule of the docstring, event by event; ``still`` is the support of zero motion, in order.
+
+    ``support`` is that of ``hits``, 1 unless given; ``levels`` are the least and the most that there is.
+    """
+    opened, n, d, t0, taken, need = False, 0, 0, 0, 0, levels[0]
+    met: dict[int, int] = dict.fromkeys(range(levels[0], levels[1] + 1), 0)
     suppressed, changes = [], []
+    supports = (hits if support is None else support).astype(int).tolist()
 
     def judge(now: int) -> None:
-        nonlocal opened, n, d
+        nonlocal opened, n, d, need, met
+        need = min([k for k in met if 65_536 * met[k] <= config.most_lost * n], default=levels[1] + 1)
+        met = dict.fromkeys(met, 0)
         was = opened
         if 256 * d < config.close_below * n:
             opened = False
@@ -41,14 +53,15 @@ def plain_guard(
             changes.append((now, opened))
         n = d = 0
 
-    for t, x, y, hit in zip(events.t.tolist(), events.x.tolist(), events.y.tolist(), hits.tolist(), strict=True):
+    for t, x, y, hit, its in zip(*(getattr(events, c).tolist() for c in "txy"), hits.tolist(), supports, strict=True):
         sampled = ((x >> 4) + 5 * (y >> 4)) % 16 == 0
         if sampled and n > 0 and t - t0 >= config.window_us:
             judge(t)
-        suppressed.append(hit and opened)
+        suppressed.append(hit and opened and its >= need)
         if sampled:
             t0 = t if n == 0 else t0
-            n, d = n + 1, d + hit - bool(still[taken])
+            n, d = n + 1, d + hit - bool(still[taken] >= levels[0])
+            met = {k: count + bool(still[taken] >= k) for k, count in met.items()}
             taken += 1
             if n == config.window_events:
                 judge(t)
@@ -81,6 +94,34 @@ def test_the_rule_is_followed_to_the_event(seed: int, span_us: int, window_us: i
     assert counters.openings - counters.closures == guard.open
     assert counters.passed == hits.sum() - sum(expected)
     assert (counters.sampled, counters.hits) == (len(sampled), hits[is_sampled(events.x, events.y)].sum())
+
+
+@settings(max_examples=40)
+@given(
+    seed=st.integers(0, 1 << 30),
+    max_loss=st.sampled_from([0.0, 0.02, 0.1, 0.4]),
+    cuts=st.lists(st.integers(0, 900), max_size=4),
+)
+def test_support_is_asked_for_until_zero_motion_meets_no_more_than_the_bound(
+    seed: int, max_loss: float, cuts: list[int]
+) -> None:
+    rng = np.random.default_rng(seed)
+    t = np.sort(rng.integers(0, 20_000, 900))
+    events = Events(t, rng.integers(0, 20, 900), rng.integers(0, 20, 900), rng.integers(0, 2, 900), 40, 40)
+    cancel = CancelConfig(horizon_us=300, early_us=100, late_us=200, uses=0, carry=3, need=2, ring_capacity=4096)
+    config = GuardConfig(enabled=True, window_events=32, window_us=5000, margin=0.05, max_loss=max_loss)
+    support = rng.integers(0, 5, 900).astype(np.uint8)
+    hits = support >= 2
+    sampled = events.select(is_sampled(events.x, events.y))
+    zero = OracleCanceller(cancel, MotionSchedule.still(), width=40, height=40).process(sampled)
+    assert zero.support is not None
+    expected, changes = plain_guard(config, events, hits, zero.support, support, (2, 4))
+    guard = Guard(config, cancel, width=40, height=40)
+    edges = [0, *sorted(cuts), 900]
+    found = [guard.process(events[a:b], hits[a:b], support[a:b]) for a, b in itertools.pairwise(edges)]
+    assert np.concatenate(found).tolist() == expected
+    assert guard.changes == changes
+    assert guard.counters.raised <= guard.counters.windows
 
 
 def test_one_pixel_in_sixteen_is_sampled() -> None:
@@ -149,7 +190,8 @@ def test_zero_motion_is_there_to_compare_even_where_small_shifts_are_not_predict
 
 
 @pytest.mark.parametrize(
-    ("field", "value"), [("window_events", 31), ("window_us", 0), ("margin", 0.001), ("margin", float("nan"))]
+    ("field", "value"),
+    [("window_events", 31), ("window_us", 0), ("margin", 0.001), ("margin", float("nan")), ("max_loss", 1.5)],
 )
 def test_what_is_out_of_range_is_refused_by_name(field: str, value: float) -> None:
     with pytest.raises(ValueError, match=field):
