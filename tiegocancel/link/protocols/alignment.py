@@ -14,7 +14,7 @@ from tiegocancel.link.protocols.options import ProtocolOptions
 from tiegocancel.link.protocols.outbox import Outbox
 from tiegocancel.link.protocols.protocol import LinkCounters, TextLine
 
-__all__ = ["AlignedDecoder", "Piece"]
+__all__ = ["AlignedDecoder", "Kind", "Piece"]
 
 _FEWEST_ROWS, _MOST_ROWS = 16, 1 << 14
 _JUNK_BITS, _LONG_JUNK_BITS, _BREACH_BITS, _AFTER_ROW_BITS, _TEXT_BITS = 10.0, 4.0, 16.0, 4.0, 5.0
@@ -94,6 +94,10 @@ class AlignedDecoder(ABC):
         """Tell whether more bytes are needed before anything can be said of ``place``."""
         return False
 
+    def _plainly(self, data: bytes, place: int) -> tuple[Kind, int] | None:
+        """Return what stands at ``place`` where that needs no search: whole text, or a good row before it."""
+        return None
+
     def _is_wild(self, row: bytes) -> bool:
         """Tell whether ``row`` would change the state so much that it is looked at again, ``look_far_rows`` far."""
         return False
@@ -151,13 +155,15 @@ class AlignedDecoder(ABC):
         end = place + self.look_rows * self.row_bytes
         if len(data) < end and not final:
             return 0
-        kind, length = self._cheapest(data[: end + 256], place, min(end, len(data)))
+        kind, length = self._plainly(data, place) or self._cheapest(
+            data[place : end + 256], min(end, len(data)) - place
+        )
         if kind == "row" and self._is_wild(data[place : place + length]):
             end = place + self.look_far_rows * self.row_bytes
             if len(data) < end:
                 # Not even a silent line decides this.
                 return 0
-            kind, length = self._cheapest(data[: end + 256], place, end)
+            kind, length = self._cheapest(data[place : end + 256], end - place)
         if kind == "row" and not self._goes_on(data[place:end]):
             kind, length = "junk", self.row_bytes
         if kind == "row":
@@ -170,13 +176,13 @@ class AlignedDecoder(ABC):
             self._breach()
         return length
 
-    def _cheapest(self, data: bytes, place: int, end: int) -> tuple[Kind, int]:
-        """Return the first step of the cheapest reading of bytes ``place`` to ``end``.
+    def _cheapest(self, data: bytes, span: int) -> tuple[Kind, int]:
+        """Return the first step of the cheapest reading of the first ``span`` bytes of ``data``.
 
         ``behind`` holds the cheapest ways to each byte that end with a piece, ``within`` those that end with a byte
         that belongs to nothing: going on so costs less there. No byte costs less than ``least``, which prunes.
         """
-        span, least, look = end - place, self._least_bits(), self._pieces
+        least, look = self._least_bits(), self._pieces
         last = span - self.row_bytes
         behind: list[list[_Path]] = [[] for _ in range(span + 1)]
         within: list[list[_Path]] = [[] for _ in range(span + 1)]
@@ -191,7 +197,7 @@ class AlignedDecoder(ABC):
                     if at > last and at:
                         best_bits, best = bits + left, first or ("junk", at)
                         continue
-                    for kind, length, piece_bits, behind_it in look(data, place + at, state):
+                    for kind, length, piece_bits, behind_it in look(data, at, state):
                         target, cost = at + length, bits + piece_bits
                         step = first or (("junk", at) if at else (kind, length))
                         if target < span:

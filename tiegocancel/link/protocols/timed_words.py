@@ -112,9 +112,9 @@ class TimedWordDecoder(AlignedDecoder):
     def _sound(self, words: NDArray[np.unsignedinteger]) -> NDArray[np.bool_]:
         """Return which words are of known kinds, their events on the sensor."""
 
-    def _cheapest(self, data: bytes, place: int, end: int) -> tuple[Kind, int]:
-        kind, length = super()._cheapest(data, place, end)
-        high = self._high_of(data, place)
+    def _cheapest(self, data: bytes, span: int) -> tuple[Kind, int]:
+        kind, length = super()._cheapest(data, span)
+        high = self._high_of(data, 0)
         if kind == "row" and high is not None and self._high is not None:
             if self._step(self._high, high) <= self.plain_steps:
                 return kind, length
