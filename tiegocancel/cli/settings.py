@@ -27,6 +27,7 @@ _KEYS = {
     "refractory_us": ("filter", "refractory_us"),
     "background_us": ("filter", "background_us"),
     "guard": ("guard", "enabled"),
+    "guard_max_loss": ("guard", "max_loss"),
     "method": ("estimate", "method"),
     "step_us": ("estimate", "step_us"),
     "window_us": ("estimate", "window_us"),
@@ -63,6 +64,16 @@ _KEYS = {
     "chunk_events": ("read", "chunk_events"),
     "keep_going": ("read", "keep_going"),
     "undistort": ("read", "undistort"),
+    "most_events": ("budget", "most_events"),
+    "clock_mhz": ("budget", "clock_mhz"),
+    "architecture": ("budget", "architecture"),
+    "readout": ("budget", "readout_events_per_second"),
+    "input_link": ("budget", "input_link_bits_per_second"),
+    "output_link": ("budget", "output_link_bits_per_second"),
+    "input_bits": ("budget", "input_bits_per_event"),
+    "output_bits": ("budget", "output_bits_per_event"),
+    "max_latency_us": ("budget", "max_latency_us"),
+    "changes": ("budget", "changes"),
     "duration": ("simulate", "duration_s"),
     "seed": ("simulate", "seed"),
 }
@@ -72,7 +83,7 @@ def add_cancel_options(parser: argparse.ArgumentParser) -> None:
     """Add the canceller's parameters; a flag that is not given leaves the configuration file's value."""
     group = parser.add_argument_group("canceller")
     group.add_argument(
-        "--preset", metavar="NAME", help="operating point: plain, selective, lean, dense; flags override it"
+        "--preset", metavar="NAME", help="operating point: plain, selective, two-speed, lean, dense; flags override it"
     )
     group.add_argument("--horizon-us", type=int, metavar="US", help="how far ahead to predict (8000; demo 40000)")
     group.add_argument("--tolerance-us", type=int, metavar="US", help="temporal gate, ± and inclusive (1000)")
@@ -106,6 +117,12 @@ def add_cancel_options(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         default=None,
         help="suppress nothing while the motion does not do better than no motion",
+    )
+    group.add_argument(
+        "--guard-max-loss",
+        type=float,
+        metavar="L",
+        help="under --guard, ask for more support until zero motion meets no more than this share of events (1)",
     )
 
 

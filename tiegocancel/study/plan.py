@@ -70,7 +70,7 @@ def search(ground: Ground, config: PlanConfig, *, progress: Callable[[Events], N
     interrupted = False
     with deferred_interrupt() as interrupt:
         found.run_references()
-        for proposal in itertools.chain(itertools.islice(grid(), found.share_of_grid), found.around()):
+        for proposal in itertools.chain(found.from_grid(), found.around()):
             interrupted = interrupt.wanted
             if interrupted or found.tried >= config.budget:
                 break
@@ -91,10 +91,13 @@ class _Search:
         self._seen: set[CancelConfig] = set()
         self._origins: dict[str, Proposal] = {}
 
-    @property
-    def share_of_grid(self) -> int:
-        """How many proposals of the grid the budget is for."""
-        return max(round(_GRID_SHARE * self._config.budget), 1)
+    def from_grid(self) -> Iterator[Proposal]:
+        """Yield the grid until its share of the budget was tried; what the stretch is too short for does not count."""
+        share = max(round(_GRID_SHARE * self._config.budget), 1)
+        for proposal in grid():
+            if self.tried >= share:
+                return
+            yield proposal
 
     def run_references(self) -> None:
         """Try the operating points that stand beside the search."""
