@@ -60,6 +60,8 @@ class SelectiveOracle:
         self._horizons = [horizon >> config.tick_bits for horizon in config.horizons_us]
         self._early = config.early_gate_us >> config.tick_bits
         self._late = [gate >> config.tick_bits for gate in config.late_gates_us]  # of OFF and of ON predictions
+        # As (offset, least squared shift at which it is looked at), in the order of preference.
+        self._window = tuple(zip(config.offsets, config.spread_shifts_squared, strict=True))
         # Every ring by the numbers under which its entries were stored; one ring unless events choose among horizons.
         self._rings: list[dict[int, _Entry]] = [{} for _ in config.ring_capacities]
         self._stored = [0] * len(self._rings)
@@ -245,7 +247,7 @@ class SelectiveOracle:
         Beside each stands the squared distance of its bin's nearest pixel.
         """
         bins: dict[Bin, int] = {}
-        for (dx, dy), least in zip(self.config.offsets, self.config.spread_shifts_squared, strict=True):
+        for (dx, dy), least in self._window:
             column, row = x + dx, y + dy
             if 0 <= column < self.width and 0 <= row < self.height and shift >= least:
                 at = (column >> self.config.bin_bits, row >> self.config.bin_bits)
