@@ -137,7 +137,7 @@ def _motion(settings: Settings, gyro: LiveGyro | None, width: int, height: int) 
     fusion: Fusion = KalmanFusion()
     if not kalman:
         fusion = ExponentialFusion(ExponentialConfig(alpha=estimate.alpha, event_alpha=estimate.alpha))
-    estimator = LiveFusedEstimator(of_events, gyro, fusion, follow_bias=rests and not kalman)
+    estimator = LiveFusedEstimator(of_events, gyro, fusion, follow_bias=rests)
     return Found(TrackedMotion(estimator, source="track, gyro of the link"))
 
 

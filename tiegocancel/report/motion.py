@@ -31,8 +31,9 @@ def draw_motion(path: Path, estimates: Sequence[MotionEstimate], truth: Rotation
 def motion_figure(estimates: Sequence[MotionEstimate], truth: RotationTrajectory | None = None) -> Figure | None:
     """Return ω, centre, deviations and sharpness against time in s since the first row, ``None`` without a centre.
 
-    Bands are two standard deviations, grey rows are doubtful; rows that nothing is said against choose the scales.
-    ``truth``, where it is known, is drawn beneath. Estimators that make no sharpness have no panel of it.
+    Bands are two standard deviations; rows that are doubtful, or know no deviation, are grey. Rows that nothing is said
+    against choose the scales. ``truth``, where it is known, is drawn beneath. Estimators that make no sharpness have no
+    panel of it.
     """
     rows = [estimate for estimate in estimates if estimate.has_center]
     if not rows:
@@ -58,7 +59,8 @@ def motion_figure(estimates: Sequence[MotionEstimate], truth: RotationTrajectory
     names = (("omega", "ω (rad/s)"), ("x", "centre x (px)"), ("y", "centre y (px)"))
     for place, (name, label) in zip(axes, names, strict=False):
         value, sigma = columns[name]
-        _band(place, t_s, value, sigma, sure, scale)
+        told = sure & np.isfinite(sigma)
+        _band(place, t_s, value, sigma, told if told.any() else sure, scale)
         if known is not None:
             place.plot(t_s, known[name], color=style.MUTED, linewidth=1.0, linestyle="--", label="truth")
             place.legend(loc="best", frameon=False)
@@ -70,7 +72,9 @@ def motion_figure(estimates: Sequence[MotionEstimate], truth: RotationTrajectory
         axes[4].set_ylabel("sharpness\n(1 = at rest)")
     axes[-1].set_xlabel("time since the first estimate (s)")
     doubtful = int((~sure).sum())
-    axes[0].set_title(f"{len(rows):,} estimates, each from what came before; {doubtful:,} doubtful (grey)", loc="left")
+    axes[0].set_title(
+        f"{len(rows):,} estimates, each from what came before; {doubtful:,} doubtful (grey); bands ±2σ", loc="left"
+    )
     return figure
 
 

@@ -95,7 +95,7 @@ class EstimationResult:
             lines.append(f"  remark       {count:,} ×: {doubt}")
         if self.estimates:
             pace, begun = self.updates_per_second, f"{self.begun[1]:.2f} s to compile and begin"
-            lines.append(f"  speed        {begun if pace is None else f'{pace:.0f} updates/s, after {begun}'}")
+            lines.append(f"  speed        {begun if pace is None else f'{pace:.3g} updates/s, after {begun}'}")
         else:
             lines.append(f"  remark       {self.duration_s * 1e3:.3g} ms of events are too short for a row: --step-us")
         return "\n".join(lines) + "\n"

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tiegocancel.estimation.inertial.gyro import GyroSamples, image_omega
 
-__all__ = ["GyroBias", "Rest", "RestConfig", "RestingBias", "estimate_bias", "rests_of"]
+__all__ = ["GyroBias", "Rest", "RestConfig", "RestingBias", "Rests", "estimate_bias"]
 
 _PARTS = 4
 _LAGS = 200
@@ -124,24 +124,30 @@ class Rest:
     image_sigma_rad_s: float
 
 
-def rests_of(samples: GyroSamples, config: RestConfig | None = None) -> dict[int, Rest]:
-    """Follow the bias causally over a recording; return what is told at each sample that completes a rest, by time.
+class Rests:
+    """Tell a filter what rests say of the bias, causally; borders of chunks change nothing."""
 
-    At most one a quarter of ``window_us``, each of samples before its time. They repeat what those before them told, so
-    none is taken as better than ``0.002`` rad/s.
-    """
-    follower = RestingBias(config)
-    index = samples.t_us // follower.config.part_us
-    firsts = np.flatnonzero(np.diff(index, prepend=index[:1] - 1)).tolist()
-    rests: dict[int, Rest] = {}
-    for first, stop in itertools.pairwise([*firsts, len(index)]):
-        before = follower.bias_rad_s
-        follower.process(samples.t_us[first:stop], samples.rate_rad_s[first:stop])
-        if follower.found and not np.array_equal(before, follower.bias_rad_s):
-            t_us = int(samples.t_us[first])
-            sigma = max(float(follower.sigma_rad_s[2]), _LEAST_SIGMA_RAD_S)
-            rests[t_us] = Rest(t_us, float(image_omega(follower.bias_rad_s[None])[0]), sigma)
-    return rests
+    def __init__(self, config: RestConfig | None = None) -> None:
+        self._follower = RestingBias(config)
+
+    def process(self, t_us: NDArray[np.int64], rate_rad_s: NDArray[np.float64]) -> dict[int, Rest]:
+        """Take samples int64[n], float64[n, 3]; return what is told at each that completes a rest, by time.
+
+        At most one a quarter of ``window_us``, each of samples before its time. They repeat what those before them
+        told, so none is taken as better than 0.002 rad/s.
+        """
+        follower = self._follower
+        index = np.asarray(t_us, np.int64) // follower.config.part_us
+        firsts = np.flatnonzero(np.diff(index, prepend=index[:1] - 1)).tolist()
+        rests: dict[int, Rest] = {}
+        for first, stop in itertools.pairwise([*firsts, len(index)]):
+            before = follower.bias_rad_s
+            follower.process(t_us[first:stop], rate_rad_s[first:stop])
+            if follower.found and not np.array_equal(before, follower.bias_rad_s):
+                at_us = int(t_us[first])
+                sigma = max(float(follower.sigma_rad_s[2]), _LEAST_SIGMA_RAD_S)
+                rests[at_us] = Rest(at_us, float(image_omega(follower.bias_rad_s[None])[0]), sigma)
+        return rests
 
 
 class RestingBias:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiegocancel.estimation.estimate import Estimator, MotionEstimate
-from tiegocancel.estimation.inertial.bias import Rest, RestConfig, rests_of
+from tiegocancel.estimation.inertial.bias import Rest, RestConfig, Rests
 from tiegocancel.estimation.inertial.gyro import GyroSamples, image_omega
 from tiegocancel.estimation.inertial.held_center import HeldCenter
 from tiegocancel.estimation.inertial.kalman import KalmanConfig, KalmanFusion
@@ -172,7 +172,7 @@ class FusedEstimator:
         self._t_us = gyro.t_us
         self._omega = image_omega(gyro)
         self._row_us = row_us
-        self._rests = None if rest is None else rests_of(gyro, rest)
+        self._rests = None if rest is None else Rests(rest).process(gyro.t_us, gyro.rate_rad_s)
         self._place = 0
         self._last_us: int | None = None
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiegocancel.estimation.estimate import Estimator, MotionEstimate
-from tiegocancel.estimation.inertial.bias import RestConfig, RestingBias
+from tiegocancel.estimation.inertial.bias import RestConfig, RestingBias, Rests
 from tiegocancel.estimation.inertial.edvs_lines import parse_edvs_line
 from tiegocancel.estimation.inertial.fusion import Fusion, fuse
 from tiegocancel.estimation.inertial.gyro import axes_matrix, image_omega
@@ -110,12 +110,12 @@ class LiveGyroEstimator:
 class LiveFusedEstimator:
     """Fuse an estimator on events with a live gyroscope; each row uses events before its time and samples up to it.
 
-    ``follow_bias`` takes off the bias found at rest before a filter that knows none.
+    ``follow_bias`` tells the filter the bias whenever the gyroscope rests.
     """
 
     def __init__(self, estimator: Estimator, gyro: LiveGyro, fusion: Fusion, *, follow_bias: bool = False) -> None:
         self._estimator, self._gyro, self._fusion = estimator, gyro, fusion
-        self._bias = RestingBias() if follow_bias else None
+        self._rests = Rests() if follow_bias else None
         self._last_us: int | None = None
 
     def process(self, events: Events) -> list[MotionEstimate]:
@@ -125,10 +125,9 @@ class LiveFusedEstimator:
             return estimates
         until_us = max([int(events.t[-1]), *(row.t_us + 1 for row in estimates[-1:])])
         times, rates = self._gyro.take(until_us)
-        if self._bias is not None and len(times):
-            rates = rates - self._bias.process(times, rates)
+        rests = self._rests.process(times, rates) if self._rests is not None and len(times) else None
         rows = []
-        for row in fuse(self._fusion, estimates, times, image_omega(rates)):
+        for row in fuse(self._fusion, estimates, times, image_omega(rates), rests=rests):
             if self._last_us is None or row.t_us > self._last_us:
                 rows.append(row)
                 self._last_us = row.t_us

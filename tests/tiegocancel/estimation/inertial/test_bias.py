@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tiegocancel.estimation.inertial.bias import RestConfig, RestingBias, estimate_bias, rests_of
+from tiegocancel.estimation.inertial.bias import RestConfig, RestingBias, Rests, estimate_bias
 from tiegocancel.estimation.inertial.files import read_gyro
 from tiegocancel.estimation.inertial.gyro import GyroSamples
 
@@ -123,7 +123,7 @@ def test_follower_learns_at_rest_and_holds_while_moving():
 
 def test_rests_of_a_recording_tell_the_bias_of_the_image_with_nothing_later():
     samples = made(shaken)
-    rests = rests_of(samples)
+    rests = Rests().process(samples.t_us, samples.rate_rad_s)
     times = np.array(sorted(rests))
     assert ((times < 1.05e6) | (times > 3.0e6)).all()
     assert len(times) == pytest.approx(2.0e6 / RestConfig().part_us, abs=8)
@@ -132,8 +132,11 @@ def test_rests_of_a_recording_tell_the_bias_of_the_image_with_nothing_later():
         assert rest.image_sigma_rad_s >= 0.002
         assert rest.t_us == t_us
     stop = int(np.searchsorted(samples.t_us, times[3], side="right"))
-    early = rests_of(GyroSamples(t_us=samples.t_us[:stop], rate_rad_s=samples.rate_rad_s[:stop]))
+    early = Rests().process(samples.t_us[:stop], samples.rate_rad_s[:stop])
     assert early == {int(t_us): rests[int(t_us)] for t_us in times[:4]}
+    cut = Rests()
+    parts = [cut.process(samples.t_us[a : a + 37], samples.rate_rad_s[a : a + 37]) for a in range(0, len(samples), 37)]
+    assert {t_us: rest for part in parts for t_us, rest in part.items()} == rests
 
 
 def test_follower_follows_a_drift():
