@@ -1,12 +1,14 @@
 """Measure what a motion that is wrong, missing or rest costs, and how soon suppression stops.
 
-    python tests/benchmarks/bench_fail_open.py [--seed N]
+    python tests/benchmarks/bench_fail_open.py [--seed N] [--loss]
 
 The built-in disc with its mover; the motion is right until 125 ms and faulty for 100 ms from then on, so that the
 fault's beginning and its end are both seen. ``mover lost``: share of the mover's events suppressed in those 100 ms.
 ``stops``: from the beginning of the fault until the last millisecond in which more than 1 % of the events are
 suppressed, whatever was predicted before it included; ``–`` where there is none, ``never`` where the fault ends first.
 ``resumes``: from the fault's end until a millisecond suppresses half of what the last ones before the fault did.
+With ``--loss`` the second table instead: ego and mover suppressed behind a guard with ``max_loss``, true motion, preset
+``selective`` that needs no support of its own.
 """
 
 from __future__ import annotations
@@ -23,18 +25,48 @@ from tiegocancel import CancelConfig, Canceller, Events, MotionSchedule
 from tiegocancel.events import EGO, MOVER
 from tiegocancel.matching.presets import PRESETS
 from tiegocancel.matching.selective import Schedules
-from tiegocancel.scene import SceneConfig, scene_named, simulate
+from tiegocancel.scene import SceneConfig, scene_named, simulate, true_motion
 from tiegocancel.study.guard import Guard, GuardConfig
 
 DURATION_S, FAULT_US, FAULT_SPAN_US, HOLD_US = 0.35, 125_000, 100_000, 30_000
 BIN_US = 1000
+LOSSES = (1.0, 0.1, 0.05, 0.03)
 FAULTS = ("wrong sign", "half the speed", "taken for rest", f"dropped, held for {HOLD_US // 1000} ms")
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seed", type=int, default=1)
-    seed = parser.parse_args().seed
+    parser.add_argument("--loss", action="store_true")
+    args = parser.parse_args()
+    (_losses if args.loss else _faults)(args.seed)
+
+
+def _losses(seed: int) -> None:
+    """Print a line a bound, a column a scene."""
+    config = replace(_config(PRESETS["selective"]), need=1)
+    names = ("disc", "noisy", "pan", "two-movers")
+    columns = []
+    for name in names:
+        scene = scene_named(name)
+        events = Events.concatenate(list(simulate(scene, duration_s=0.25, seed=seed)))
+        motion = (true_motion(scene, duration_s=0.25).schedule(config.horizon_us),)
+        size = {"width": events.width, "height": events.height}
+        decisions = Canceller(config, motion, **size, track_source=False).process(events)
+        counted = events.t >= int(events.t[0]) + 80_000
+        fields = []
+        for max_loss in LOSSES:
+            guard = Guard(GuardConfig(enabled=True, max_loss=max_loss), config, **size)
+            suppressed = guard.process(events, decisions.suppressed, decisions.support)
+            fields.append(", ".join(f"{suppressed[counted & (events.label == k)].mean():.3f}" for k in (EGO, MOVER)))
+        columns.append(fields)
+    sys.stdout.write(f"| `L` | {' | '.join(names)} |\n|{'---|' * (len(names) + 1)}\n")
+    for max_loss, *row in zip(LOSSES, *columns, strict=True):
+        sys.stdout.write(f"| {max_loss:g} | {' | '.join(row)} |\n")
+
+
+def _faults(seed: int) -> None:
+    """Print a line a fault, a preset and a guard."""
     turning, resting = (
         Events.concatenate(list(simulate(scene, duration_s=DURATION_S, seed=seed)))
         for scene in (_disc(), replace(_disc(), rig=replace(_disc().rig, omega_rad_s=0.0)))

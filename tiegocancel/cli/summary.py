@@ -49,7 +49,12 @@ def summary_text(result: RunResult, verdict: Verdict) -> str:
     if result.diagnosis is not None:
         lines.append(f"  diagnosis    {result.diagnosis.text}")
     speed = rate_text(result.counters.events / result.seconds) if result.seconds else "–"
-    lines.append(f"  speed        {speed}; state {result.state.total_kib:,.0f} KiB")
+    lines.append(f"  speed        {speed}")
+    state, entries = result.state, sum(result.settings.cancel.ring_capacities)
+    lines.append(
+        f"  state        {state.total_kib:,.0f} KiB: {entries:,} entries of {state.ring_entry} bits in the ring, "
+        f"{state.cells:,} cells of {state.cell} bits in the table"
+    )
     return "\n".join(lines) + "\n"
 
 
