@@ -14,6 +14,7 @@ from tiegocancel.cli import (
     convert,
     demo,
     emulate,
+    export,
     info,
     link,
     motion,
@@ -90,6 +91,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"tiegocancel {tiegocancel.__version__}")
     parser.add_argument("-v", "--verbose", action="count", default=0, help="log more; twice: tracebacks")
     verbs = parser.add_subparsers(title="verbs", metavar="VERB", required=True)
-    for verb in (demo, run, plan, motion, simulate, info, convert, ports, record, replay, emulate, link, targets):
+    every = (demo, run, plan, motion, simulate, info, convert, ports, record, replay, emulate, link, export, targets)
+    for verb in every:
         verb.add_parser(verbs)
     return parser
