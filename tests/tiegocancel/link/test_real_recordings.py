@@ -46,8 +46,10 @@ def over_the_emulator(events: Events, form: str, *, speed: float, baud: int) -> 
 
 def assert_exact(events: Events, form: str, *, speed: float, baud: int) -> None:
     found, emulator, link = over_the_emulator(events, form, speed=speed, baud=baud)
-    # The host sets the device's clock to zero, so that it counts from the first event on.
-    assert np.array_equal(found.t - found.t[0], events.t - events.t[0])
+    # The host sets the device's clock to zero, so that it counts from the first event on. What E2 does not carry, whole
+    # turns of its 16 bits within a pause, nobody can know.
+    steps = np.diff(events.t) % (1 << 16) if form == "E2" else np.diff(events.t)
+    assert np.array_equal(np.diff(found.t), steps)
     for name in "xyp":
         assert np.array_equal(getattr(found, name), getattr(events, name)), name
     counters = link.decoder.counters

@@ -155,10 +155,14 @@ class AlignedDecoder(ABC):
         end = place + self.look_rows * self.row_bytes
         if len(data) < end and not final:
             return 0
+        # Where too little follows to weigh, an event alone behind a long pause is no cheaper than a spoilt one.
+        lone = len(data) < end and self._in_step and self._only_rows(data, place)
         kind, length = self._plainly(data, place) or self._cheapest(
             data[place : end + 256], min(end, len(data)) - place
         )
-        if kind == "row" and self._is_wild(data[place : place + length]):
+        if kind == "junk" and lone:
+            kind, length = "row", self.row_bytes
+        if kind == "row" and not lone and self._is_wild(data[place : place + length]):
             end = place + self.look_far_rows * self.row_bytes
             if len(data) < end:
                 # Not even a silent line decides this.
@@ -175,6 +179,22 @@ class AlignedDecoder(ABC):
             self._in_step = False
             self._breach()
         return length
+
+    def _only_rows(self, data: bytes, place: int) -> bool:
+        """Tell whether all that stands from ``place`` on may be rows, the first of them not out of time."""
+        state = self._state()
+        if self._is_wild(data[place : place + self.row_bytes]) and self._doubts_pauses():
+            return False
+        for at in range(place, len(data) - self.row_bytes + 1, self.row_bytes):
+            rows = [piece for piece in self._pieces(data, at, state) if piece[0] == "row"]
+            if not rows:
+                return False
+            state = rows[0][3]
+        return True
+
+    def _doubts_pauses(self) -> bool:
+        """Tell whether a step in time can be too long to be a pause."""
+        return True
 
     def _cheapest(self, data: bytes, span: int) -> tuple[Kind, int]:
         """Return the first step of the cheapest reading of the first ``span`` bytes of ``data``.

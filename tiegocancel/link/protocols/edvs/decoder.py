@@ -169,6 +169,9 @@ class EdvsDecoder(AlignedDecoder):
         step_us = (int.from_bytes(row[2:], "big") - self._stamp) & (self._period_us - 1)
         return step_us > min(self.options.max_jump_us, self._period_us // 2)
 
+    def _doubts_pauses(self) -> bool:
+        return self._period_us > self.options.max_jump_us
+
     def _goes_on(self, rows: bytes) -> bool:
         if self._stamp is None or self._period_us <= self.options.max_jump_us:
             return True
