@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from abc import ABC, abstractmethod
 from typing import Any, Literal
 
@@ -14,13 +15,17 @@ from tiegocancel.link.protocols.options import ProtocolOptions
 from tiegocancel.link.protocols.outbox import Outbox
 from tiegocancel.link.protocols.protocol import LinkCounters, TextLine
 
-__all__ = ["AlignedDecoder", "Kind", "Piece"]
+__all__ = ["LONGEST_TEXT", "PRINTABLE", "TEXT", "AlignedDecoder", "Kind", "Piece"]
 
-_FEWEST_ROWS, _MOST_ROWS = 16, 1 << 14
+_FEWEST_ROWS, _ROWS_BEHIND_TEXT, _MOST_ROWS = 16, 1024, 1 << 14
 _JUNK_BITS, _LONG_JUNK_BITS, _BREACH_BITS, _AFTER_ROW_BITS, _TEXT_BITS = 10.0, 4.0, 16.0, 4.0, 5.0
 """What a byte costs that belongs to nothing, what a breach costs, and that it seldom begins just behind a good row;
 a character of text."""
 
+
+LONGEST_TEXT = 200
+PRINTABLE = re.compile(rb"[\t\r\x20-\x7e]{0,201}")
+TEXT = re.compile(rb"[\t\r\x20-\x7e]{0,200}\n")
 
 Kind = Literal["row", "text", "junk"]
 
@@ -94,6 +99,33 @@ class AlignedDecoder(ABC):
         """Tell whether more bytes are needed before anything can be said of ``place``."""
         return False
 
+    def _is_whole_text(self, text: bytes) -> bool:
+        """Tell whether text has its end, or was cut where the search stopped looking."""
+        return text.endswith(b"\n")
+
+    def _rest_of_text(self, data: bytes, place: int) -> tuple[Kind, int]:
+        """Find the end of text that was cut; nothing yet where it may still come, junk where it is none."""
+        if line := TEXT.match(data, place):
+            return "text", len(line[0])
+        length = len(PRINTABLE.match(data, place)[0])  # type: ignore[index]
+        if place + length == len(data) and length <= LONGEST_TEXT:
+            return "text", 0
+        return "junk", max(length, 1)
+
+    def _text_piece(self, data: bytes, place: int, state: Any) -> list[Piece]:
+        """Return the text at ``place``, up to its end or that of ``data``; none where there is none."""
+        length = len(PRINTABLE.match(data, place)[0])  # type: ignore[index]
+        if data[place + length : place + length + 1] == b"\n":
+            length += 1
+        elif not length or place + length < len(data):
+            return []
+        return [("text", length, 6.0 + _TEXT_BITS * length, state)]
+
+    def _text_waits(self, data: bytes, place: int) -> bool:
+        """Tell whether all from ``place`` on may be text whose end is to come."""
+        length = len(PRINTABLE.match(data, place)[0])  # type: ignore[index]
+        return 0 < length <= LONGEST_TEXT and place + length == len(data)
+
     def _plainly(self, data: bytes, place: int) -> tuple[Kind, int] | None:
         """Return what stands at ``place`` where that needs no search: whole text, or a good row before it."""
         return None
@@ -133,11 +165,11 @@ class AlignedDecoder(ABC):
                     break
                 self._rows_at_once = min(self._rows_at_once * 4, _MOST_ROWS)
                 continue
+            self._rows_at_once = _FEWEST_ROWS
             step = self._search(data, place, final=final)
             if not step:
                 break
             place += step
-            self._rows_at_once = _FEWEST_ROWS
         if place:
             self._held = data[place:]
         return self._outbox.take(self.counters)
@@ -157,9 +189,8 @@ class AlignedDecoder(ABC):
             return 0
         # Where too little follows to weigh, an event alone behind a long pause is no cheaper than a spoilt one.
         lone = len(data) < end and self._in_step and self._only_rows(data, place)
-        kind, length = self._plainly(data, place) or self._cheapest(
-            data[place : end + 256], min(end, len(data)) - place
-        )
+        end = min(end, len(data))
+        kind, length = self._plainly(data, place) or self._cheapest(data[place:end], end - place)
         if kind == "junk" and lone:
             kind, length = "row", self.row_bytes
         if kind == "row" and not lone and self._is_wild(data[place : place + length]):
@@ -167,14 +198,17 @@ class AlignedDecoder(ABC):
             if len(data) < end:
                 # Not even a silent line decides this.
                 return 0
-            kind, length = self._cheapest(data[place : end + 256], end - place)
+            kind, length = self._cheapest(data[place:end], end - place)
         if kind == "row" and not self._goes_on(data[place:end]):
             kind, length = "junk", self.row_bytes
+        if kind == "text" and not self._is_whole_text(data[place : place + length]):
+            kind, length = self._rest_of_text(data, place)
         if kind == "row":
             self._accept(np.frombuffer(data, np.uint8, length, place).reshape(1, length), searched=True)
-        elif kind == "text":
+        elif kind == "text" and length:
             self._take_text(data[place : place + length])
-        else:
+            self._rows_at_once = _ROWS_BEHIND_TEXT
+        elif kind == "junk":
             self.counters.bad_bytes += length
             self._in_step = False
             self._breach()

@@ -14,8 +14,11 @@ def to_device(events: Events, options: ProtocolOptions) -> Events:
     """Return the events in the axes that ``options`` turn into those of ``events``."""
     if not (options.swap_xy or options.flip_x or options.flip_y):
         return events
-    x = events.width - 1 - events.x.astype(np.int64) if options.flip_x else events.x
-    y = events.height - 1 - events.y.astype(np.int64) if options.flip_y else events.y
+    x, y = events.x, events.y
+    if options.flip_x:
+        x = (events.width - 1 - x.astype(np.int64)).astype(np.uint16)
+    if options.flip_y:
+        y = (events.height - 1 - y.astype(np.int64)).astype(np.uint16)
     if options.swap_xy:
         return Events(events.t, y, x, events.p, events.height, events.width, events.label)
     return Events(events.t, x, y, events.p, events.width, events.height, events.label)

@@ -80,7 +80,8 @@ class TimedWordDecoder(AlignedDecoder):
         self._undecided = -1
         if not plain[-1] and (rows - int(at[-1])) * self.row_bytes < _LOOK_BYTES:
             self._undecided = int(at[-1])
-        return plain | (near & np.append(near[1:], False))
+        fits: NDArray[np.bool_] = plain | (near & np.append(near[1:], False))
+        return fits
 
     def _confirmed(self, data: bytes, place: int, high: int, *, final: bool) -> bool | None:
         """Tell whether the next time words go on from ``high``; ``None`` while they may still come."""

@@ -26,10 +26,8 @@ _PERIOD_BITS, _BACK_BITS = 14.0, 10.0
 """What it costs that a whole period passes within a few events, where real pauses do so too (E2); and that the step
 which completes it looks like a small one back."""
 _RECENT = 64
-_REPLY = re.compile(rb"-[A-Z][\x20-\x7e]{1,100}\n(?=[\x80-\xff-])")
-"""A whole line of a sensor, with an event or another such line behind it."""
-_TEXT = re.compile(rb"[\t\r\x20-\x7e]{0,200}\n")
-_TEXT_SO_FAR = re.compile(rb"[\t\r\x20-\x7e]{0,200}\Z")
+_REPLY = re.compile(rb"-[A-Z][\x20-\x7e]{1,100}\n")
+_REPLY_BEGINS = re.compile(rb"-[A-Z]")
 _BANNER = re.compile(rb"e?DVS", re.IGNORECASE)
 
 
@@ -113,10 +111,7 @@ class EdvsDecoder(AlignedDecoder):
 
     def _pieces(self, data: bytes, place: int, state: Any) -> list[Piece]:
         if data[place] < 0x80:
-            line = _TEXT.match(data, place)
-            if line is None:
-                return []
-            return [("text", len(line[0]), 6.0 + 5.0 * len(line[0]), state)]
+            return self._text_piece(data, place, state)
         end = place + self.row_bytes
         if end > len(data):
             return []
@@ -152,13 +147,13 @@ class EdvsDecoder(AlignedDecoder):
         return (_PLACE_BITS + (self._step_bits(0) if self._stamp_bytes else 0.0)) / self.row_bytes
 
     def _waits(self, data: bytes, place: int) -> bool:
-        return data[place] < 0x80 and len(data) - place < 200 and _TEXT_SO_FAR.match(data, place) is not None
+        return data[place] < 0x80 and self._text_waits(data, place)
 
     def _plainly(self, data: bytes, place: int) -> tuple[Kind, int] | None:
         if line := _REPLY.match(data, place):
             return "text", len(line[0])
         row = data[place : place + self.row_bytes]
-        if self._stamp is None or row[0] < 0x80 or not _REPLY.match(data, place + self.row_bytes):
+        if self._stamp is None or row[0] < 0x80 or not _REPLY_BEGINS.match(data, place + self.row_bytes):
             return None
         step_us = (int.from_bytes(row[2:], "big") - self._stamp) & (self._period_us - 1)
         return ("row", self.row_bytes) if step_us <= self._plain_us else None

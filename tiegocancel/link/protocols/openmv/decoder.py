@@ -20,17 +20,16 @@ SIDE_PX = 320
 WRAP_S = 1 << 16
 _PERIOD_US = WRAP_S * 1_000_000
 _CHUNK = re.compile(rb"C (\d{1,6}) ")
-_NEXT_LINE = re.compile(rb"(\r?\n|C \d{1,6} )(?:C \d{1,6} )?[A-Za-z0-9+/]{16}")
-_TEXT = re.compile(rb"[\t\r\x20-\x7e]{0,200}\n")
-_TEXT_SO_FAR = re.compile(rb"[\t\r\x20-\x7e]{0,200}\Z")
+_NEXT_LINE = re.compile(rb"(\r?\nC \d{1,6} |C \d{1,6} )[A-Za-z0-9+/]{16}")
 _DATA = re.compile(r"[A-Za-z0-9+/]{8,}={0,2}|C \d+.*")
 _ROW_BYTES = 16
 """An event is 6 numbers of 16 bits, 12 bytes, and so 16 characters of base64 for itself."""
 _ALPHABET = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/"
 _VALUE = np.full(256, 255, np.uint8)
-_VALUE[np.frombuffer(_ALPHABET, np.uint8)] = np.arange(64)
+_VALUE[np.frombuffer(_ALPHABET, np.uint8)] = np.arange(64, dtype=np.uint8)
 _OTHER_KIND = 5
-_ROW_BITS, _JUMP_BITS = 30.0, 145.0
+_ROW_BITS, _PAUSE_BITS, _JUMP_BITS = 30.0, 30.0, 145.0
+_PLAIN_US = 16_384
 _NUMBERS = struct.Struct("<6H")
 _ROW_TEXT = re.compile(rb"[A-Za-z0-9+/]{16}")
 
@@ -39,10 +38,14 @@ class _Fields(NamedTuple):
     """Columns [n] of rows: whether each can be one, its kind, its time in µs, column and row."""
 
     sound: NDArray[np.bool_]
-    kind: NDArray[np.int64]
+    kind: NDArray[np.uint16]
     clock_us: NDArray[np.int64]
-    x: NDArray[np.int64]
-    y: NDArray[np.int64]
+    x: NDArray[np.uint16]
+    y: NDArray[np.uint16]
+
+    def head(self, count: int) -> _Fields:
+        """Return the first ``count`` rows."""
+        return _Fields(self.sound[:count], self.kind[:count], self.clock_us[:count], self.x[:count], self.y[:count])
 
 
 class OpenMvDecoder(AlignedDecoder):
@@ -62,25 +65,19 @@ class OpenMvDecoder(AlignedDecoder):
         self._clock_us: int | None = None
         self._time_us = 0
         self._told = self._came = 0
+        self._seen = self._fields(np.zeros((0, _ROW_BYTES), np.uint8))
 
     def _fields(self, rows: NDArray[np.uint8]) -> _Fields:
-        value = _VALUE[rows]
-        group = value.reshape(-1, 4, 4).astype(np.int64)
-        bits = group[..., 0] << 18 | group[..., 1] << 12 | group[..., 2] << 6 | group[..., 3]
-        first, second, third = bits >> 16 & 0xFF, bits >> 8 & 0xFF, bits & 0xFF
-        # Two groups of 3 bytes are three numbers, low byte first.
-        kind, seconds, ms = (
-            first[:, 0] | second[:, 0] << 8,
-            third[:, 0] | first[:, 1] << 8,
-            second[:, 1] | third[:, 1] << 8,
-        )
-        us, x, y = first[:, 2] | second[:, 2] << 8, third[:, 2] | first[:, 3] << 8, second[:, 3] | third[:, 3] << 8
-        sound = (value < 64).all(axis=1) & (kind <= _OTHER_KIND) & (ms < 1000) & (us < 1000)
+        sound: NDArray[np.bool_] = (_VALUE[rows] < 64).all(axis=1)
+        text = rows if sound.all() else np.where(sound[:, None], rows, ord("A"))
+        numbers = np.frombuffer(a2b_base64(text.astype(np.uint8).tobytes()), "<u2").reshape(-1, 6)
+        kind, seconds, ms, us, x, y = numbers.T
+        sound &= (kind <= _OTHER_KIND) & (ms < 1000) & (us < 1000)
         sound &= (kind > 1) | ((x < self._columns) & (y < self._rows))
-        return _Fields(sound, kind, (seconds * 1000 + ms) * 1000 + us, x, y)
+        return _Fields(sound, kind, (seconds.astype(np.int64) * 1000 + ms) * 1000 + us, x, y)
 
     def _fits(self, rows: NDArray[np.uint8]) -> NDArray[np.bool_]:
-        fields = self._fields(rows)
+        self._seen = fields = self._fields(rows)
         return fields.sound & (self._steps(fields.clock_us) <= self.options.max_jump_us)
 
     def _steps(self, clock_us: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -88,7 +85,8 @@ class OpenMvDecoder(AlignedDecoder):
         return np.diff(clock_us, prepend=first) % _PERIOD_US
 
     def _take(self, rows: NDArray[np.uint8], *, searched: bool) -> None:
-        fields = self._fields(rows)
+        # Blocks that were not searched are the beginning of what was just looked at.
+        fields = self._fields(rows) if searched else self._seen.head(len(rows))
         if self._clock_us is None:
             self._time_us = int(fields.clock_us[0])
         steps = self._steps(fields.clock_us)
@@ -112,13 +110,14 @@ class OpenMvDecoder(AlignedDecoder):
         pieces: list[Piece] = []
         if head := _CHUNK.match(data, place):
             pieces.append(("text", len(head[0]), 8.0 + 4.0 * len(head[0]), state))
-        elif line := _TEXT.match(data, place):
-            pieces.append(("text", len(line[0]), 6.0 + 5.0 * len(line[0]), state))
+        else:
+            pieces += self._text_piece(data, place, state)
         clock_us = self._clock_of(data[place : place + _ROW_BYTES])
         if clock_us is not None:
             step_us = 0 if state is None else (clock_us - state) % _PERIOD_US
             plausible = step_us <= self.options.max_jump_us
             bits = _ROW_BITS + (2 * math.log2(1 + step_us) if plausible else _JUMP_BITS)
+            bits += _PAUSE_BITS if step_us > _PLAIN_US and plausible else 0.0
             pieces.append(("row", _ROW_BYTES, bits, clock_us))
         return pieces
 
@@ -131,13 +130,16 @@ class OpenMvDecoder(AlignedDecoder):
             return None
         return int((seconds * 1000 + ms) * 1000 + us)
 
+    def _is_whole_text(self, text: bytes) -> bool:
+        return text.endswith(b"\n") or _CHUNK.fullmatch(text.lstrip()) is not None
+
     def _plainly(self, data: bytes, place: int) -> tuple[Kind, int] | None:
         if head := _NEXT_LINE.match(data, place):
             return "text", len(head[1])
         clock_us = self._clock_of(data[place : place + _ROW_BYTES])
         if clock_us is None or self._clock_us is None or not _NEXT_LINE.match(data, place + _ROW_BYTES):
             return None
-        plain = (clock_us - self._clock_us) % _PERIOD_US <= self.options.max_jump_us
+        plain = (clock_us - self._clock_us) % _PERIOD_US <= _PLAIN_US
         return ("row", _ROW_BYTES) if plain else None
 
     def _is_wild(self, row: bytes) -> bool:
@@ -159,10 +161,10 @@ class OpenMvDecoder(AlignedDecoder):
         return int(np.count_nonzero(fields.sound[1:] & (steps[1:] < steps[0]))) < 2
 
     def _waits(self, data: bytes, place: int) -> bool:
-        return len(data) - place < 200 and _TEXT_SO_FAR.match(data, place) is not None
+        return self._text_waits(data, place)
 
     def _take_text(self, line: bytes) -> None:
-        if head := _CHUNK.fullmatch(line):
+        if head := _CHUNK.fullmatch(line.lstrip()):
             self._count_line(int(head[1]))
             return
         text = line.decode("ascii").strip()
