@@ -88,7 +88,7 @@ def _jittered(events: Events) -> Events:
 def _field(events: Events, config: CancelConfig, motion: Trajectory) -> str:
     schedules = tuple(motion.schedule(horizon_us) for horizon_us in config.horizons_us)
     ego, mover, held = _shares(events, config, schedules)
-    still, _, _ = _shares(events, replace(config, least_shift_px=0.0), MotionSchedule.still())
+    still, _, _ = _shares(events, config.without_motion(), MotionSchedule.still())
     first, *more = (max(round(HEADROOM * count), 1) for count in held)
     sized = replace(config, ring_capacity=first, more_ring_capacities=tuple(more))
     kib = state_bits(sized, width=events.width, height=events.height).total_kib

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-from dataclasses import replace
 
 from tiegocancel.firmware_sim.state import state_bits
 
@@ -40,7 +39,7 @@ def main() -> None:
             schedules = tuple(motion.schedule(horizon_us) for horizon_us in config.horizons_us)
             ego, mover = shares(events, config, schedules)
             # Under a least shift zero motion would predict nothing, and the control would be 0 by construction.
-            still, _ = shares(events, replace(config, least_shift_px=0.0), MotionSchedule.still())
+            still, _ = shares(events, config.without_motion(), MotionSchedule.still())
             kib = state_bits(config, width=events.width, height=events.height).total_kib
             cells.append(f"{ego:.3f}, {mover:.3f}: **{ego - mover:.2f}** ({still:.2f}; {kib:,.0f})")
         sys.stdout.write(f"| {name} | {' | '.join(cells)} |\n")

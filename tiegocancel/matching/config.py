@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Literal
 
@@ -151,6 +151,20 @@ class CancelConfig:
     def horizons_us(self) -> tuple[int, ...]:
         """All horizons, rising."""
         return (self.horizon_us, *self.more_horizons_us)
+
+    def without_motion(self) -> CancelConfig:
+        """Return what zero motion is tried with: the same gates and cells, and nothing that is 0 by construction.
+
+        A least shift would forbid every prediction of "same place"; and without motion every event chooses the longest
+        horizon, so that its ring holds for so long what all rings hold for theirs.
+        """
+        rings: tuple[int, ...] = ()
+        if self.chooses:
+            longest_us = self.horizons_us[-1]
+            pairs = zip(self.ring_capacities, self.horizons_us, strict=True)
+            room = sum(-(-held * longest_us // horizon_us) for held, horizon_us in pairs)
+            rings = (min(room, MAX_RING_CAPACITY),) * len(self.more_horizons_us)
+        return replace(self, least_shift_px=0.0, more_ring_capacities=rings)
 
     @property
     def chooses(self) -> bool:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tiegocancel.events import Events
 from tiegocancel.matching.canceller import Canceller
-from tiegocancel.matching.config import MAX_RING_CAPACITY, CancelConfig
+from tiegocancel.matching.config import CancelConfig
 from tiegocancel.motion.schedule import MotionSchedule
 
 __all__ = ["Guard", "GuardConfig", "GuardCounters", "is_sampled"]
@@ -121,18 +121,17 @@ class Guard:
     What zero motion meets with support ``k`` is met by chance, or for being slow: it stands for events that have
     nothing to do with the motion. Of a mover that goes nearly with the background it says nothing.
 
-    A device holds two counters, one time, one bit, and where ``max_loss`` is below 1 the ``m_k`` and ``need``; and for
-    zero motion a table of 1/16 of the pixels (no cell lies outside the sampled blocks) and a ring of 1/8 of the
-    canceller's, twice what an even scene asks. A block has no candidates beyond its edge, which costs zero motion a
-    tenth of its hits at a gate of 2 px.
+    A device holds two counters, one time, one bit, and where ``max_loss`` is below 1 the ``m_k`` and ``need``; and
+    for zero motion a table of 1/16 of the pixels (no cell lies outside the sampled blocks) and a ring of 1/8 of the
+    canceller's (where events choose a horizon, of what all would need for the longest), twice what an even scene
+    asks. A block has no candidates beyond its edge, which costs zero motion a tenth of its hits at a gate of 2 px.
     """
 
     def __init__(self, config: GuardConfig, cancel: CancelConfig, *, width: int, height: int) -> None:
         self.config = config
-        capacity = min(max(-(-cancel.ring_capacity // 8), 1), MAX_RING_CAPACITY)
-        # A least shift would forbid every prediction of "same place".
-        more = tuple(max(-(-ring // 8), 1) for ring in cancel.ring_capacities[1:])
-        still = replace(cancel, ring_capacity=capacity, more_ring_capacities=more, least_shift_px=0.0)
+        still = cancel.without_motion()
+        first, *more = (max(-(-ring // 8), 1) for ring in still.ring_capacities)
+        still = replace(still, ring_capacity=first, more_ring_capacities=tuple(more))
         self._still = Canceller(still, MotionSchedule.still(), width=width, height=height, track_source=False)
         self.open = False
         self.changes: list[tuple[int, bool]] = []

@@ -151,7 +151,8 @@ class OnePass:
         if counters.overflow:
             window_s = max(self.settings.cancel.horizons_us[-1] - self.settings.cancel.early_gate_us, 0) * 1e-6
             self.notes.append(
-                f"{counters.overflow:,} predictions did not fit the ring of {self.settings.cancel.ring_capacity:,}: "
+                f"{counters.overflow:,} predictions did not fit the ring of "
+                f"{' + '.join(f'{ring:,}' for ring in self.settings.cancel.ring_capacities)}: "
                 f"at the peak of {rate_text(self.rate.peak_hz())} it needs about "
                 f"{int(self.rate.peak_hz() * window_s):,} (--ring-capacity)"
             )
@@ -324,8 +325,7 @@ class OnePass:
         motion = self._motion_of(name)
         config = self.settings.cancel
         if name == "zero_motion":
-            # Under a least shift zero motion would predict nothing, and the control would be 0 by construction.
-            config = replace(config, least_shift_px=0.0)
+            config = config.without_motion()
         canceller = Canceller(config, motion, width=self.width, height=self.height, track_source=False)
         tally = Tally(self.region, counted_from_us)
         if name == "time_shuffled":

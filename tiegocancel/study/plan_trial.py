@@ -114,8 +114,7 @@ class Course:
             if hopeless is not None and hopeless(Bound(kib=kib, reads=reads, margin=ego - mover, whole=whole)):
                 return None
         # Gates and cells are the same; only what "too near" discards must not hide what the gates let through.
-        open_config = replace(config, least_shift_px=0.0)
-        zero = self._canceller(open_config, MotionSchedule.still()).process(events).suppressed
+        zero = self._canceller(config.without_motion(), MotionSchedule.still()).process(events).suppressed
         back = self._canceller(config, self._motion(config, backwards=True)).process(events).suppressed
         return Trial(
             name=name,

@@ -129,6 +129,13 @@ def test_gates_of_off_are_those_of_on_unless_given() -> None:
     assert (config.reaches_squared_px, config.reach_squared_px) == ((1, 4), 4)
 
 
+def test_zero_motion_is_tried_with_room_for_all_in_the_longest_horizon() -> None:
+    table: dict[str, Any] = {"more_horizons_us": (16_000,), "ring_capacity": 100, "least_shift_px": 1.0}
+    chosen = CancelConfig(**table, choose_px=4, more_ring_capacities=(50,)).without_motion()
+    assert (chosen.ring_capacities, chosen.least_shift_px) == ((100, 100 * 2 + 50), 0.0)
+    assert CancelConfig(**table).without_motion() == CancelConfig(**{**table, "least_shift_px": 0.0})
+
+
 def test_events_that_choose_fill_a_ring_for_each_horizon() -> None:
     table: dict[str, Any] = {"more_horizons_us": (16_000, 32_000), "ring_capacity": 100}
     assert CancelConfig(**table).ring_capacities == (100,)
