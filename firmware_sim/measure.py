@@ -105,6 +105,17 @@ class Gauge:
         """Return the level of the input FIFO."""
         return _level(self.column("arrival"), self.column("taken"), bins)
 
+    def ring_level(self, bins: int = 200) -> Level:
+        """Return the level of the rings, at decisions."""
+        decided, held = self.column("decided"), self.column("held")
+        if not len(held):
+            return Level(most_by_time=np.zeros(bins, np.int64), high_water=0, mean=0.0)
+        start, stop = int(decided[0]), int(decided[-1]) + 1
+        most = np.zeros(bins, np.int64)
+        np.maximum.at(most, np.minimum((decided - start) * bins // (stop - start), bins - 1), held)
+        weights = np.diff(decided, append=stop)
+        return Level(most_by_time=most, high_water=int(held.max()), mean=float((held * weights).sum()) / (stop - start))
+
     def output_level(self, bins: int = 200) -> Level:
         """Return the level of the output FIFO: residuals decided and not yet taken by the link."""
         residual = ~self.fate("suppressed")[~self.fate("dropped")]

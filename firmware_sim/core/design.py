@@ -18,7 +18,7 @@ __all__ = ["EVENT_TIME_BITS", "CoreDesign"]
 EVENT_TIME_BITS = 32
 """Time of an event in the FIFOs: 71 minutes of µs, as EVT2 and eDVS E4 carry it."""
 
-_SWEEP_SHARE = 0.05
+_SWEEP_SHARE, _MOST_SWEEP_SHARE = 0.05, 0.25
 _MOST_TIME_BITS = 40
 
 
@@ -48,10 +48,17 @@ class CoreDesign:
         The plain rule's ring holds predictions with their stamps, which sets the least; the sweep must come round
         before a stamp comes back, see ``state.state_bits``.
         """
-        if self.time_bits:
-            return self.time_bits
+        return self.time_bits or self._bits_for(_SWEEP_SHARE)
+
+    @property
+    def narrowest_stamp_bits(self) -> int:
+        """Width at which the sweep takes up to a quarter of the cycles."""
+        return self._bits_for(_MOST_SWEEP_SHARE)
+
+    def _bits_for(self, share: float) -> int:
+        """Return the least width at which the sweep takes at most this share of the cycles."""
         for bits in range(self._least_bits, _MOST_TIME_BITS):
-            if self._scrub_cycles(bits) >= fastest_scrub(self.core) / _SWEEP_SHARE / 2:
+            if self._scrub_cycles(bits) >= fastest_scrub(self.core) / share / 2:
                 return bits
         return _MOST_TIME_BITS
 

@@ -11,7 +11,7 @@ from tiegocancel.firmware_sim.jit import jit
 
 __all__ = [
     "KIND", "LEFT", "LOW", "MATCH", "OP_FIELDS", "OWNER", "PASS", "READY", "RIGHT", "TOP", "WRITE", "WRITES",
-    "decide", "op_room",
+    "decide", "op_room", "rings_held",
 ]  # fmt: skip
 
 Int64s = NDArray[np.int64]
@@ -61,7 +61,7 @@ def _age_left(rule: Rule, state: State, cell: int, now: int) -> Any:
     left = state.cell_due[cell] - now + rule.late[p]
     if rule.stamp_period:
         left &= rule.stamp_period - 1
-        if left > rule.early_most + rule.late[p]:
+        if left > rule.early + rule.late[p]:
             return -1
     return max(left, -1)
 
@@ -142,13 +142,13 @@ def _drain(rule: Rule, state: State, now: int, ops: NDArray[np.int64]) -> Any:
         while state.passed[h] < state.stored[ring]:
             slot = state.ring_base[ring] + state.passed[h] % state.ring_room[ring]
             due = (state.ring_t[slot] >> rule.tick_bits) + rule.horizon[h]
-            if due - rule.early_most > now:
+            if due - rule.early > now:
                 break
             state.passed[h] += 1
             state.counts[_PASSES] += 1
             asked = state.ring_t[slot]
             if rule.at_gate:
-                asked += (rule.horizon[h] - rule.early_most) << rule.tick_bits
+                asked += (rule.horizon[h] - rule.early) << rule.tick_bits
             k = _row_of(rule.row_t, state.row_hint[h], asked)
             state.row_hint[h] = k
             x, y, at = state.ring_x[slot], state.ring_y[slot], (h * width + k) * 6
@@ -220,8 +220,6 @@ def _match(rule: Rule, state: State, now: int, x: int, y: int, p: int, row: int)
         sign = state.cell_p[cell]
         if not rule.blur and sign != p ^ rule.flip:
             continue
-        if left > rule.early[sign] + rule.late[sign]:
-            continue
         if rule.dx[o] * rule.dx[o] + rule.dy[o] * rule.dy[o] > rule.reach[sign]:
             continue
         if rule.lines:
@@ -243,6 +241,15 @@ def _match(rule: Rule, state: State, now: int, x: int, y: int, p: int, row: int)
         support += votes & 1
         votes >>= 1
     return nearest, support
+
+
+@jit
+def rings_held(rule: Rule, state: State) -> Any:
+    """Return how many entries all rings hold together."""
+    held = 0
+    for ring in range(len(state.ring_room)):
+        held += state.stored[ring] - state.passed[ring if rule.chooses else len(rule.horizon) - 1]
+    return held
 
 
 @jit
@@ -278,10 +285,7 @@ def _remember(rule: Rule, state: State, t: int, x: int, y: int, p: int, support:
     state.ring_support[slot], state.ring_owner[slot] = min(rule.carry, support), state.counts[0] - 1
     state.stored[ring] += 1
     state.counts[_PREDICTED] += 1
-    held = 0
-    for r in range(len(state.ring_room)):
-        held += state.stored[r] - state.passed[r if rule.chooses else many - 1]
-    state.counts[_HIGH] = max(state.counts[_HIGH], held)
+    state.counts[_HIGH] = max(state.counts[_HIGH], rings_held(rule, state))
     return slot
 
 

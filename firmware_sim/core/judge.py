@@ -114,7 +114,7 @@ def fit_constraints(
             note=f"{use.usable} with room to route",
         )
         for use in memory_map.uses
-        if use.need or not memory_map.fits
+        if use.need
     ]
     if memory_map.unplaced:
         found.append(

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from tiegocancel.firmware_sim.core.function import decide
+from tiegocancel.firmware_sim.core.function import decide, rings_held
 from tiegocancel.firmware_sim.core.rule import Rule, State
 from tiegocancel.firmware_sim.core.timing import Clock, Plan, drops, issue_event, take
 from tiegocancel.firmware_sim.jit import jit
@@ -35,7 +35,9 @@ def run_chunk(
     fate: NDArray[np.uint8],
     cycles: NDArray[np.int64],
 ) -> Any:
-    """Fill ``fate`` [n] and ``cycles`` [n, 5]: taken, first issue, match issued, decided, left; −1 where dropped.
+    """Fill ``fate`` [n] and ``cycles`` [n, 6]: taken, first issue, match issued, decided, left; −1 where dropped.
+
+    The last column is not a cycle: how many entries the rings hold after the event.
 
     ``arrival`` [n] rises; when ``saturated`` it is not looked at: the next event always waits.
     """
@@ -53,3 +55,4 @@ def run_chunk(
             state.ring_ready[slot] = commit + 2
         fate[i] = suppressed
         cycles[i, 0], cycles[i, 1], cycles[i, 2], cycles[i, 3], cycles[i, 4] = taken, first, issued, decided, left
+        cycles[i, 5] = rings_held(rule, state)

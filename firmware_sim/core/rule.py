@@ -40,9 +40,8 @@ class Rule(NamedTuple):
     tick_bits: int
     stamp_period: int
     horizon: Int64s  # [horizons], rising
-    early_most: int
-    early: Int64s  # [2] of OFF and ON predictions
-    late: Int64s  # [2]
+    early: int
+    late: Int64s  # [2] of OFF and ON predictions
     reach: Int64s  # [2] px²
     flip: int
     blur: int
@@ -115,8 +114,7 @@ def lay_out_rule(
         tick_bits=tick,
         stamp_period=stamp_period,
         horizon=np.array(config.horizons_us, np.int64) >> tick,
-        early_most=config.early_gate_us >> tick,
-        early=np.array(config.early_gates_us, np.int64) >> tick,
+        early=config.early_gate_us >> tick,
         late=np.array(config.late_gates_us, np.int64) >> tick,
         reach=np.array(config.reaches_squared_px, np.int64),
         flip=int(config.polarity == "equal"),

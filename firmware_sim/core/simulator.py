@@ -25,7 +25,7 @@ class CoreTrace:
     """What became of each event of a chunk, and when: arrays of its length, in cycles, −1 where it was dropped.
 
     ``arrival`` at the input FIFO; ``taken`` by predict; ``first`` issue of its operations; ``issued`` its match;
-    ``decided``; ``left`` the output FIFO (``decided`` for a suppressed event).
+    ``decided``; ``left`` the output FIFO (``decided`` for a suppressed event). ``held``: entries of the rings after it.
     """
 
     suppressed: NDArray[np.bool_]
@@ -36,6 +36,7 @@ class CoreTrace:
     issued: NDArray[np.int64]
     decided: NDArray[np.int64]
     left: NDArray[np.int64]
+    held: NDArray[np.int64]
 
     @property
     def latency(self) -> NDArray[np.int64]:
@@ -114,7 +115,7 @@ class CoreSimulator:
             if len(arrival) != count or arrival[0] <= self._last_arrival or (np.diff(arrival) < 1).any():
                 raise ValueError("arrivals must rise by at least one cycle from event to event")
             self._last_arrival = int(arrival[-1])
-        fate, cycles = np.zeros(count, np.uint8), np.zeros((count, 5), np.int64)
+        fate, cycles = np.zeros(count, np.uint8), np.zeros((count, 6), np.int64)
         run_chunk(
             self.rule,
             self.state,
@@ -130,7 +131,7 @@ class CoreSimulator:
             fate,
             cycles,
         )
-        taken, first, issued, decided, left = cycles.T
+        taken, first, issued, decided, left, held = cycles.T
         if self._saturated:
             arrival = taken - 1
         return CoreTrace(
@@ -142,6 +143,7 @@ class CoreSimulator:
             issued=issued,
             decided=decided,
             left=left,
+            held=held,
         )
 
 

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 import tiegocancel
 from tiegocancel.cli import (
+    budget,
     convert,
     demo,
     emulate,
@@ -24,6 +25,7 @@ from tiegocancel.cli import (
     replay,
     run,
     simulate,
+    study_thesis,
     targets,
 )
 from tiegocancel.errors import ConfigError, TiegoCancelError
@@ -91,7 +93,24 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"tiegocancel {tiegocancel.__version__}")
     parser.add_argument("-v", "--verbose", action="count", default=0, help="log more; twice: tracebacks")
     verbs = parser.add_subparsers(title="verbs", metavar="VERB", required=True)
-    every = (demo, run, plan, motion, simulate, info, convert, ports, record, replay, emulate, link, export, targets)
+    every = (
+        demo,
+        run,
+        plan,
+        study_thesis,
+        budget,
+        motion,
+        simulate,
+        info,
+        convert,
+        ports,
+        record,
+        replay,
+        emulate,
+        link,
+        export,
+        targets,
+    )
     for verb in every:
         verb.add_parser(verbs)
     return parser

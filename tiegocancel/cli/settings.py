@@ -179,8 +179,13 @@ def add_output_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--config", type=Path, metavar="FILE", help="TOML file with every setting; flags override it")
 
 
-def settings_from(args: argparse.Namespace, defaults: dict[str, dict[str, Any]] | None = None) -> Settings:
-    """Return the settings: ``defaults`` of the verb, then the file, then the flags that were given."""
+def settings_from(
+    args: argparse.Namespace, defaults: dict[str, dict[str, Any]] | None = None, *, aside: tuple[str, ...] = ()
+) -> Settings:
+    """Return the settings: ``defaults`` of the verb, then the file, then the flags that were given.
+
+    Tables named in ``aside`` are the verb's own, and left to it.
+    """
     from tiegocancel.study.settings import Settings
 
     tables: dict[str, Any] = {name: dict(table) for name, table in (defaults or {}).items()}
@@ -188,6 +193,8 @@ def settings_from(args: argparse.Namespace, defaults: dict[str, dict[str, Any]] 
     if args.config is not None:
         where = str(args.config)
         for name, table in load_toml(args.config).items():
+            if name in aside:
+                continue
             if not isinstance(table, dict):
                 raise ConfigError(f"{where}: {name} must be a table ([{name}]), not {table!r}")
             tables[name] = {**tables.get(name, {}), **table}

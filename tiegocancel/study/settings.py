@@ -7,9 +7,11 @@ from typing import Literal
 
 from tiegocancel.files.options import ReadOptions
 from tiegocancel.filters.config import FilterConfig
+from tiegocancel.firmware_sim.core.config import CoreConfig
 from tiegocancel.matching.config import CancelConfig
 from tiegocancel.scene.camera_config import CameraSceneConfig
 from tiegocancel.scene.config import SceneConfig
+from tiegocancel.study.budget.settings import BudgetSettings
 from tiegocancel.study.guard import GuardConfig
 
 __all__ = [
@@ -154,3 +156,5 @@ class Settings:
     simulate: SimulateSettings = field(default_factory=SimulateSettings)
     scene: SceneConfig = field(default_factory=SceneConfig)
     camera_scene: CameraSceneConfig = field(default_factory=CameraSceneConfig)
+    core: CoreConfig = field(default_factory=CoreConfig)
+    budget: BudgetSettings = field(default_factory=BudgetSettings)

@@ -1,0 +1,1 @@
+"""Judge parts on a recording: does it fit, does it keep up, and if not, what gives."""
