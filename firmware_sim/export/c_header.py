@@ -34,6 +34,11 @@ def vectors_header(vectors: Vectors) -> str:
     shape = (len(schedules), len(schedules[0]), 6)
     lines = [f"#define {_macro('events')} ({_literal(count)}) /* from an empty state on */"]
 
+    lines += [
+        f"#define {_macro(f'count_{name}')} ({_literal(count)}) /* counted at the end */"
+        for name, count in dict(vectors.counters).items()
+    ]
+
     def column(name: str, values: Iterable[int], text: str) -> list[str]:
         return _array(name, list(values), (count,), text)
 

@@ -52,9 +52,10 @@ def constants(vectors: Vectors) -> list[Constant]:
         Constant("tick_bits", tick, "a tick is 2^tick_bits us"),
         Constant("horizons", len(config.horizons_us), "how many"),
         Constant("horizon_ticks", ticks(config.horizons_us), "rising"),
-        Constant("early_ticks", ticks(config.early_gates_us), "gate before the predicted time: of OFF, of ON"),
+        Constant(
+            "early_ticks", config.early_gate_us >> tick, "gate before the predicted time, when entries are passed"
+        ),
         Constant("late_ticks", ticks(config.late_gates_us), "gate after the predicted time: of OFF, of ON"),
-        Constant("drain_early_ticks", config.early_gate_us >> tick, "entries are passed so long before their time"),
         Constant("reach_squared_px", config.reaches_squared_px, "largest dx*dx + dy*dy: of OFF, of ON"),
         Constant("polarity_flip", int(config.polarity == "equal"), "1: a prediction meets the other polarity"),
         Constant("polarity_any", int(config.polarity == "ignore"), "1: a prediction meets both polarities"),

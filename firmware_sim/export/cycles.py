@@ -32,10 +32,17 @@ def core_cycles(vectors: Vectors, core: CoreConfig, *, clock_hz: float) -> CoreC
     design = CoreDesign(core, vectors.config, events.width, events.height, clock_hz, core.stamp_bits)
     scrub_cycles = 0 if core.stamp_bits else design.scrub_cycles
     if core.stamp_bits == 0 and core.coefficient_fraction_bits == FRACTION_BITS:
-        told = _simulator(vectors, core, 0, saturated=True).process(events).suppressed
+        exact = _simulator(vectors, core, 0, saturated=True)
+        told = exact.process(events).suppressed
         if not np.array_equal(told, vectors.suppressed):
             row = int(np.argmax(told != vectors.suppressed))
             raise ValueError(f"the simulated core does not serve this configuration: it decides event {row} otherwise")
+        for name, count in dict(vectors.counters).items():
+            if exact.counts[name] != count:
+                raise ValueError(
+                    f"the simulated core does not serve this configuration: it counts {exact.counts[name]} {name}, "
+                    f"not {count}"
+                )
     trace = _simulator(vectors, core, scrub_cycles).process(events, arrival)
     return CoreCycles(
         core=core,

@@ -16,6 +16,7 @@ from tiegocancel.firmware_sim.export.write import CONFIG, FORMAT, VECTORS, VERSI
 
 from tiegocancel.errors import InputError
 from tiegocancel.events import Events
+from tiegocancel.matching.canceller import Counters
 from tiegocancel.matching.config import CancelConfig
 from tiegocancel.motion.schedule import MotionSchedule
 
@@ -86,6 +87,7 @@ def _assembled(folder: Path, config: dict[str, Any]) -> Vectors:
         schedules=schedules,
         suppressed=suppressed.astype(np.bool_),
         support=support.astype(np.uint8),
+        counters=Counters(**config["counters"]),
         cycles=cycles,
     )
 

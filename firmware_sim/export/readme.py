@@ -35,6 +35,8 @@ def readme_text(vectors: Vectors, words: dict[str, Word]) -> str:
         "  x' = ((x << 16) + a*x + b*y + c + 32768) >> 16     (arithmetic shift)",
         "  y' = ((y << 16) + d*x + e*y + f + 32768) >> 16",
         "",
+        "Counted at the end: " + ", ".join(f"{name} {count}" for name, count in dict(vectors.counters).items()) + ".",
+        "",
         "Words, highest bits first. $readmemh reads the files as they are, with reg [bits-1:0] m [0:words-1]:",
     ]
     for name, word in words.items():
@@ -53,6 +55,7 @@ def readme_text(vectors: Vectors, words: dict[str, Word]) -> str:
         "config.json            every parameter in ticks, bits and squared px, the layouts above, and the",
         "                       configuration as it was given (cancel)",
         "tiegocancel_config.h   the same parameters for C99",
+        "tiegocancel_config.vh  the same for Verilog; element i of a list is NAME[i*NAME_BITS +: NAME_BITS]",
         "tiegocancel_vectors.h  events, decisions and schedule as static const arrays",
         "vectors.json           the same numbers once more, the command, and the SHA-256 of every file",
     ]

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from tiegocancel.firmware_sim.core.config import CoreConfig
 
 from tiegocancel.events import Events
+from tiegocancel.matching.canceller import Counters
 from tiegocancel.matching.config import CancelConfig
 from tiegocancel.matching.selective import Schedules, schedules_for
 from tiegocancel.matching.selective_oracle import SelectiveOracle
@@ -44,7 +45,8 @@ class Vectors:
     """One stretch of events with the decision of each, made by a canceller whose state was empty before the first.
 
     ``schedules`` are one for each horizon, cut to the entries that these events use; no entry lies before
-    :func:`time_base_us`. ``support`` uint8[n] is ``S`` of the semantics. Raise ``ValueError`` for a stretch without
+    :func:`time_base_us`. ``support`` uint8[n] is ``S`` of the semantics, ``counters`` what the canceller has counted at
+    the end. Raise ``ValueError`` for a stretch without
     events, for columns of another length and for schedules that do not serve the configuration.
     """
 
@@ -53,6 +55,7 @@ class Vectors:
     schedules: Schedules
     suppressed: NDArray[np.bool_]
     support: NDArray[np.uint8]
+    counters: Counters
     cycles: CoreCycles | None = None
 
     def __post_init__(self) -> None:
@@ -85,6 +88,7 @@ class Vectors:
             ("the sensor", (self.events.width, self.events.height) == (other.events.width, other.events.height)),
             *((f"column {name}", _same(self.events, other.events, name)) for name in ("t", "x", "y", "p")),
             *((f"column {name}", _same(self, other, name)) for name in ("suppressed", "support")),
+            ("the counters", self.counters == other.counters),
             ("the schedules", _same_schedules(self.schedules, other.schedules)),
             ("the cycles", _same_cycles(self.cycles, other.cycles)),
         )
@@ -118,6 +122,7 @@ def golden_vectors(
         schedules=schedules,
         suppressed=np.concatenate([one.suppressed for one in decisions]),
         support=np.concatenate([one.support for one in decisions if one.support is not None]),
+        counters=model.counters,
     )
 
 

@@ -22,6 +22,7 @@ from tiegocancel.firmware_sim.export.layout import (
 )
 from tiegocancel.firmware_sim.export.readme import readme_text
 from tiegocancel.firmware_sim.export.vectors import Vectors
+from tiegocancel.firmware_sim.export.verilog_header import VERILOG_HEADER, verilog_header
 from tiegocancel.firmware_sim.export.words import memh_text
 
 import tiegocancel
@@ -29,7 +30,7 @@ import tiegocancel
 __all__ = ["CONFIG", "FILES", "FORMAT", "README", "VECTORS", "VERSION", "columns_of", "write_vectors"]
 
 CONFIG, VECTORS, README = "config.json", "vectors.json", "README.txt"
-FILES = (EVENTS, DECISIONS, SCHEDULE, CYCLES, CONFIG, CONFIG_HEADER, VECTORS_HEADER, README, VECTORS)
+FILES = (EVENTS, DECISIONS, SCHEDULE, CYCLES, CONFIG, CONFIG_HEADER, VERILOG_HEADER, VECTORS_HEADER, README, VECTORS)
 """Every file that can be written; ``cycles.memh`` is where a core was simulated."""
 FORMAT, VERSION = "tiegocancel vectors", 1
 
@@ -58,13 +59,14 @@ def write_vectors(folder: Path, vectors: Vectors, *, command: Sequence[str]) -> 
 def columns_of(vectors: Vectors) -> dict[str, Any]:
     """Return the numbers of the vectors as JSON holds them, times as those of the recording."""
     events = vectors.events
-    columns = {
+    columns: dict[str, Any] = {
         "events": {
             "t_us": events.t.tolist(),
             "x": events.x.tolist(),
             "y": events.y.tolist(),
             "p": events.p.tolist(),
         },
+        "counters": dict(vectors.counters),
         "decisions": {
             "suppressed": vectors.suppressed.astype(int).tolist(),
             "support": vectors.support.tolist(),
@@ -137,6 +139,7 @@ def _texts(vectors: Vectors) -> Iterator[tuple[str, str]]:
         )
     yield CONFIG, json.dumps(_config_table(vectors), indent=2) + "\n"
     yield CONFIG_HEADER, config_header(constants(vectors))
+    yield VERILOG_HEADER, verilog_header(constants(vectors))
     yield VECTORS_HEADER, vectors_header(vectors)
     yield README, readme_text(vectors, words)
 
@@ -162,6 +165,7 @@ def _config_table(vectors: Vectors) -> dict[str, Any]:
             "cell": cell_word(vectors).to_json(),
         },
         "words": {name: word.to_json() for name, word in vector_words(vectors).items()},
+        "counters": dict(vectors.counters),
         "cancel": asdict(config),
     }
     if vectors.cycles is not None:

@@ -56,7 +56,7 @@ int main(void)
         int64_t x = (int64_t)tiegocancel_event_x[i];
         int64_t y = (int64_t)tiegocancel_event_y[i];
         int p = (int)tiegocancel_event_p[i];
-        while ((head < tail) && (ring[head].due - (int64_t)TIEGOCANCEL_DRAIN_EARLY_TICKS <= t)) {
+        while ((head < tail) && (ring[head].due - (int64_t)TIEGOCANCEL_EARLY_TICKS <= t)) {
             table[ring[head].y * (int64_t)TIEGOCANCEL_WIDTH + ring[head].x] = ring[head];
             head++;
         }

@@ -100,6 +100,7 @@ def assert_headers_hold_the_vectors(compiler: str, folder: Path, vectors: Vector
     assert {name: told[name] for name in expected} == expected
     assert (told["TIME_BASE_US"], told["WIDTH"]) == (vectors.time_base_us, vectors.events.width)
     assert told["EVENTS"] == len(vectors.events)
+    assert told["COUNT_PREDICTED"] == vectors.counters.predicted
 
 
 @pytest.mark.parametrize("seed", range(8))

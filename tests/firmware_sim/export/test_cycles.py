@@ -64,6 +64,9 @@ def test_a_core_of_another_rule_tells_no_cycles(disc: Callable[..., Vectors]) ->
     wrong[700] ^= True
     with pytest.raises(ValueError, match="does not serve this configuration: it decides event 700 otherwise"):
         core_cycles(replace(vectors, suppressed=wrong), CoreConfig(), clock_hz=1e8)
+    counters = replace(vectors.counters, outside=1 + vectors.counters.outside)
+    with pytest.raises(ValueError, match=f"it counts {vectors.counters.outside} outside, not {counters.outside}"):
+        core_cycles(replace(vectors, counters=counters), CoreConfig(), clock_hz=1e8)
 
 
 def test_a_stretch_beyond_counting_is_refused(disc: Callable[..., Vectors]) -> None:
