@@ -1,0 +1,121 @@
+"""Draw CR over both gates (Fig. 7.2) and the ranking of all combinations (Table 7.1)."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import PercentFormatter
+from numpy.typing import NDArray
+
+from tiegocancel.report import style
+from tiegocancel.report.thesis.series import LOOKS, label_of
+from tiegocancel.study.thesis.experiments import GRID, SERIES
+from tiegocancel.study.thesis.ranking import rank
+from tiegocancel.study.thesis.results import share
+from tiegocancel.study.thesis.study import ThesisResult
+
+__all__ = ["gap_maps", "heatmaps", "ranking"]
+
+_ROWS = ("printed", "gated", "zero", "stream")
+
+
+def heatmaps(result: ThesisResult) -> Figure | None:
+    """Draw a map of ε_xy against ε_t for each series and drawn horizon."""
+    chosen = [h for h in result.settings.grid.heatmaps_us if h in result.settings.grid.horizons_us]
+    if not chosen:
+        return None
+    drawn = style.figure(3.4 * len(chosen) + 0.8, 2.05 * len(_ROWS) + 0.4)
+    axes = drawn.subplots(len(_ROWS), len(chosen), sharex=True, sharey=True, squeeze=False)
+    for line, name in zip(axes, _ROWS, strict=True):
+        for panel, horizon_us in zip(line, chosen, strict=True):
+            shown = panel.imshow(_map(result, name, horizon_us), cmap="viridis", vmin=0, vmax=1, aspect="auto")
+            _write(panel, _map(result, name, horizon_us))
+            _gates(panel, result)
+        line[0].set_ylabel(f"{_short(name)}\nε_xy (px)")
+    for panel, horizon_us in zip(axes[0], chosen, strict=True):
+        panel.set_title(f"Δt = {horizon_us / 1000:g} ms")
+    for panel in axes[-1]:
+        panel.set_xlabel("ε_t (ms)")
+    drawn.colorbar(shown, ax=axes, label="events suppressed", format=PercentFormatter(1.0), shrink=0.5)
+    return drawn
+
+
+def gap_maps(result: ThesisResult) -> Figure | None:
+    """Draw what is left of CR when zero motion's is taken off, over Δt and each gate (the best of the other)."""
+    horizons = result.settings.grid.horizons_us
+    cube = np.stack([_map(result, "gated", h) - _map(result, "zero", h) for h in horizons])
+    if not np.isfinite(cube).any():
+        return None
+    drawn = style.figure(10.5, 3.6)
+    panels = drawn.subplots(1, 2)
+    grid = result.settings.grid
+    filled = np.where(np.isfinite(cube), cube, -np.inf)
+    for panel, axis, ticks, words in (
+        (panels[0], 2, [f"{value:g}" for value in grid.tolerances_px], "ε_xy (px), best ε_t"),
+        (panels[1], 1, [f"{value / 1000:g}" for value in grid.tolerances_us], "ε_t (ms), best ε_xy"),
+    ):
+        best = filled.max(axis=axis).T
+        best[~np.isfinite(best)] = np.nan
+        shown = panel.imshow(best, cmap="PuOr_r", vmin=-0.9, vmax=0.9, aspect="auto", origin="lower")
+        panel.set_yticks(range(len(ticks)), ticks)
+        every = max(len(horizons) // 10, 1)
+        panel.set_xticks(range(0, len(horizons), every), [f"{h / 1000:g}" for h in horizons[::every]])
+        panel.set(xlabel="Δt (ms)", ylabel=words)
+    panels[0].set_title("CR − CR of zero motion, by gate in space")
+    panels[1].set_title("CR − CR of zero motion, by gate in time")
+    drawn.colorbar(shown, ax=panels, label="points above zero motion", format=PercentFormatter(1.0))
+    return drawn
+
+
+def ranking(result: ThesisResult) -> Figure:
+    """Draw the ten best combinations of each series by CR."""
+    drawn = style.figure(10.5, 3.4)
+    axes = drawn.subplots(1, 4, sharex=True)
+    for panel, name in zip(axes, ("printed", "gated", "zero", "stream"), strict=True):
+        best = rank(result, name)[:10]
+        words = [f"{h / 1000:g} ms · {px:g} px · {t / 1000:g} ms" for h, px, t, _, _ in best]
+        panel.barh(range(len(best)), [line[3] for line in best], color=LOOKS[name]["color"], height=0.7)
+        panel.set_yticks(range(len(best)), words, fontsize=7)
+        panel.invert_yaxis()
+        for place, line in enumerate(best):
+            panel.text(0.03, place, f"{line[3]:.1%}, {line[4] or 0:.2f} px", va="center", color="white", fontsize=6.5)
+        panel.set_title(_short(name), fontsize=9)
+        panel.set_xlim(0, 1.0)
+        panel.xaxis.set_major_formatter(PercentFormatter(1.0))
+        style.tidy(panel, grid=None)
+    drawn.supylabel("Δt · ε_xy · ε_t", fontsize=8)
+    drawn.supxlabel("events suppressed; in the bars CR and mean distance of the matches", fontsize=8)
+    return drawn
+
+
+def _map(result: ThesisResult, name: str, horizon_us: int) -> NDArray[np.float64]:
+    """Return CR, rows ε_xy, columns ε_t, NaN where nothing was measured."""
+    grid = result.settings.grid
+    values = np.full((len(grid.tolerances_px), len(grid.tolerances_us)), np.nan)
+    for row, tolerance_px in enumerate(grid.tolerances_px):
+        for column, tolerance_us in enumerate(grid.tolerances_us):
+            point = SERIES[name].point.at(horizon_us=horizon_us, tolerance_px=tolerance_px, tolerance_us=tolerance_us)
+            found = result.results.row(point)
+            if found is not None:
+                values[row, column] = share(found)
+    return values
+
+
+def _write(panel: Axes, values: NDArray[np.float64]) -> None:
+    for (row, column), value in np.ndenumerate(values):
+        if np.isfinite(value):
+            colour = "white" if value < 0.6 else style.INK
+            panel.text(column, row, f"{100 * value:.0f}", ha="center", va="center", fontsize=8, color=colour)
+
+
+def _gates(panel: Axes, result: ThesisResult) -> None:
+    grid = result.settings.grid
+    panel.set_xticks(range(len(grid.tolerances_us)), [f"{value / 1000:g}" for value in grid.tolerances_us])
+    panel.set_yticks(range(len(grid.tolerances_px)), [f"{value:g}" for value in grid.tolerances_px])
+
+
+def _short(name: str) -> str:
+    """Name a series in a word or two."""
+    words = {"printed": "as printed", "gated": "eq. (4.4), own off", "zero": "zero motion", "stream": "streaming"}
+    return words.get(name, label_of(name) if name in GRID else name)

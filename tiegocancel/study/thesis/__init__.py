@@ -1,0 +1,1 @@
+"""Rerun every experiment of the thesis, with the controls that it lacks, and compare its figures with ours."""
