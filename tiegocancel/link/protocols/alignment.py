@@ -150,7 +150,15 @@ class AlignedDecoder(ABC):
         data = self._held
         bytes_ = np.frombuffer(data, np.uint8)
         place = 0
-        while (rows := (len(data) - place) // self.row_bytes) > 0:
+        while place < len(data):
+            rows = (len(data) - place) // self.row_bytes
+            if not rows:
+                # Less than a row: only whole text can be told.
+                if (plain := self._plainly(data, place)) is None or plain[0] != "text":
+                    break
+                self._take_text(data[place : place + plain[1]])
+                place += plain[1]
+                continue
             count = min(rows, self._rows_at_once)
             block = bytes_[place : place + count * self.row_bytes].reshape(count, self.row_bytes)
             fits = self._fits(block)
@@ -185,12 +193,15 @@ class AlignedDecoder(ABC):
         if self._waits(data, place):
             return 0
         end = place + self.look_rows * self.row_bytes
-        if len(data) < end and not final:
+        plain = self._plainly(data, place)
+        if plain is None and len(data) < end and not final:
             return 0
         # Where too little follows to weigh, an event alone behind a long pause is no cheaper than a spoilt one.
         lone = len(data) < end and self._in_step and self._only_rows(data, place)
+        if plain is None and not lone and len(data) < end and self._is_wild(data[place : place + self.row_bytes]):
+            return 0
         end = min(end, len(data))
-        kind, length = self._plainly(data, place) or self._cheapest(data[place:end], end - place)
+        kind, length = plain or self._cheapest(data[place:end], end - place)
         if kind == "junk" and lone:
             kind, length = "row", self.row_bytes
         if kind == "row" and not lone and self._is_wild(data[place : place + length]):

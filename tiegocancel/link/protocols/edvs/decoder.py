@@ -159,7 +159,7 @@ class EdvsDecoder(AlignedDecoder):
         return ("row", self.row_bytes) if step_us <= self._plain_us else None
 
     def _is_wild(self, row: bytes) -> bool:
-        if self._stamp is None or not self._stamp_bytes:
+        if self._stamp is None or not self._stamp_bytes or row[0] < 0x80:
             return False
         step_us = (int.from_bytes(row[2:], "big") - self._stamp) & (self._period_us - 1)
         return step_us > min(self.options.max_jump_us, self._period_us // 2)

@@ -18,6 +18,7 @@ _FRAMES_AT_ONCE = 256
 _HELLO_EVERY_US = 500_000
 _HELLO_EVERY_FRAMES = 512
 _HIGHEST_TICKS = 1 << 62
+_WIDEST_PX = 65_535
 _LONGEST_TEXT, _MOST_DECISIONS = 200, 4096
 
 
@@ -62,6 +63,8 @@ class FramedEncoder:
         """Return the frames of a chunk."""
         if not len(events):
             return b""
+        if max(events.width, events.height) > _WIDEST_PX:
+            raise ConfigError(f"a HELLO holds sensors up to {_WIDEST_PX} px, not {events.width}x{events.height}")
         if (events.width, events.height) != self._size:
             self._size, self._hello_us = (events.width, events.height), None
         highest = max(abs(int(events.t[0])), abs(int(events.t[-1])))

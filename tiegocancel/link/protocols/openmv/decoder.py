@@ -19,6 +19,7 @@ __all__ = ["SIDE_PX", "WRAP_S", "OpenMvDecoder"]
 SIDE_PX = 320
 WRAP_S = 1 << 16
 _PERIOD_US = WRAP_S * 1_000_000
+_MARKER = re.compile(rb"((?:\r?\n)?<[\x20-\x7e]{1,80}\r?\n)")
 _CHUNK = re.compile(rb"C (\d{1,6}) ")
 _NEXT_LINE = re.compile(rb"(\r?\nC \d{1,6} |C \d{1,6} )[A-Za-z0-9+/]{16}")
 _DATA = re.compile(r"[A-Za-z0-9+/]{8,}={0,2}|C \d+.*")
@@ -134,7 +135,7 @@ class OpenMvDecoder(AlignedDecoder):
         return text.endswith(b"\n") or _CHUNK.fullmatch(text.lstrip()) is not None
 
     def _plainly(self, data: bytes, place: int) -> tuple[Kind, int] | None:
-        if head := _NEXT_LINE.match(data, place):
+        if (head := _NEXT_LINE.match(data, place)) or (head := _MARKER.match(data, place)):
             return "text", len(head[1])
         clock_us = self._clock_of(data[place : place + _ROW_BYTES])
         if clock_us is None or self._clock_us is None or not _NEXT_LINE.match(data, place + _ROW_BYTES):
