@@ -21,9 +21,8 @@ def verilog_header(parameters: Sequence[Constant]) -> str:
     for one in parameters:
         name = f"TIEGOCANCEL_{one.name.upper()}"
         if isinstance(one.value, int):
-            sign = " signed" if one.signed else ""
-            width = 64 if one.signed else max(unsigned_bits(one.value), 32)
-            lines.append(f"localparam{sign} [{width - 1}:0] {name} = {_hex(one.value, width)}; // {one.text}")
+            kind = " signed [63:0]" if one.signed else f" [{max(unsigned_bits(one.value), 32) - 1}:0]"
+            lines.append(f"localparam{kind} {name} = {_decimal(one.value, one.signed)}; // {one.text}")
             continue
         low, high = min(one.value), max(one.value)
         bits = signed_bits(low, high) if one.signed else unsigned_bits(high)
@@ -32,6 +31,13 @@ def verilog_header(parameters: Sequence[Constant]) -> str:
         lines.append(f"localparam [31:0] {name}_BITS = 32'd{bits};")
         lines.append(f"localparam [{total - 1}:0] {name} = {_hex(packed, total)}; // {len(one.value)}: {one.text}")
     return "\n".join(lines) + "\n"
+
+
+def _decimal(value: int, signed: bool) -> str:
+    """Return a sized number; a sign stands before it."""
+    if signed:
+        return f"{'-' if value < 0 else ''}64'sd{abs(value)}"
+    return f"{max(unsigned_bits(value), 32)}'d{value}"
 
 
 def _hex(value: int, width: int) -> str:

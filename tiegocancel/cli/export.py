@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -47,7 +47,7 @@ def add_parser(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
         "--core-clock-mhz",
         type=float,
         metavar="MHZ",
-        help="write arrival and decision cycles of a simulated core at this clock too",
+        help="write arrival and decision cycles of the core of [core] at this clock too",
     )
     parser.add_argument("--json", action="store_true", help="print one JSON object on stdout")
     parser.add_argument("--config", type=Path, metavar="FILE", help="TOML file with every setting; flags override it")
@@ -73,7 +73,7 @@ def run(args: argparse.Namespace) -> int:
     with open_events(args.source, **asdict(settings.read)) as reader:
         vectors, notes = _vectors(args, settings, reader)
     if clock_hz is not None:
-        vectors = _with_cycles(vectors, clock_hz)
+        vectors = _with_cycles(vectors, settings, clock_hz)
     notes += _remarks(vectors, settings)
     for note in notes:
         sys.stderr.write(f"note: {note}\n")
@@ -140,15 +140,12 @@ def _vectors(args: argparse.Namespace, settings: Settings, reader: Any) -> tuple
             raise ConfigError(f"--motion {settings.motion.source}: {error}") from error
 
 
-def _with_cycles(vectors: Vectors, clock_hz: float) -> Vectors:
-    """Return the vectors with the cycles of the core."""
-    from dataclasses import replace
-
-    from tiegocancel.firmware_sim.core.config import CoreConfig
+def _with_cycles(vectors: Vectors, settings: Settings, clock_hz: float) -> Vectors:
+    """Return the vectors with the cycles of the core of the settings."""
     from tiegocancel.firmware_sim.export import core_cycles
 
     try:
-        return replace(vectors, cycles=core_cycles(vectors, CoreConfig(), clock_hz=clock_hz))
+        return replace(vectors, cycles=core_cycles(vectors, settings.core, clock_hz=clock_hz))
     except ValueError as error:
         raise ConfigError(f"--core-clock-mhz: {error}") from error
 

@@ -115,6 +115,19 @@ def test_a_core_adds_its_cycles_and_the_next_export_takes_them_away(disc: Path, 
     assert read_vectors(Path("v")).cycles is None
 
 
+def test_the_core_is_that_of_the_configuration(disc: Path, invoke: Invoke) -> None:
+    Path("core.toml").write_text('[core]\nlookup = "banked"\noverlap = "forward"\n', encoding="utf-8")
+    given = ("export", disc, *truth(disc), *SHORT, "--max-events", 2000, "--core-clock-mhz", 50)
+    assert invoke(*given, "--out", "serial")[0] == 0
+    assert invoke(*given, "--out", "banked", "--config", "core.toml")[0] == 0
+    serial, banked = (read_vectors(Path(name)).cycles for name in ("serial", "banked"))
+    assert serial is not None
+    assert banked is not None
+    assert (serial.core.lookup, banked.core.lookup) == ("serial", "banked")
+    assert serial.arrival.tolist() == banked.arrival.tolist()
+    assert (banked.decided - banked.arrival).mean() < (serial.decided - serial.arrival).mean()
+
+
 def test_vectors_that_test_nothing_are_told(disc: Path, invoke: Invoke) -> None:
     code, _, err = invoke("export", disc, *truth(disc), "--max-events", 100)
     assert code == 0
