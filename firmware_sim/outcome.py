@@ -35,11 +35,6 @@ class Device(Protocol):
         ...
 
     @property
-    def waited(self) -> dict[str, int]:
-        """Cycles lost, by cause."""
-        ...
-
-    @property
     def work(self) -> dict[str, int]:
         """Work done, by kind."""
         ...
@@ -103,7 +98,8 @@ def run_device(
         suppressed[at], kept[at] = trace.suppressed, ~trace.dropped
         if len(at):
             cycles = max(cycles, int(trace.left.max()) + 1, int(arrival.max()) + 1)
-    counts, waited, work = device.counts, device.waited, device.work
+    counts, work = device.counts, device.work
+    waited: dict[str, int] = getattr(device, "waited", {})  # a core's; a firmware's cycles stand in its work
     pace = _pace(make("saturated"), events.select(kept), warm_up_us)
     need = gauge.input_level().high_water
     if gauge.drops:
