@@ -26,25 +26,28 @@ class LinkReader(threading.Thread):
     """Open a line, start the device, decode until told to stop, and stop the device.
 
     ``fault`` is the line of the error that ended it, ``None`` for a clean end; ``banner`` what the device called
-    itself; ``reconnects`` how often the line came back. After a fault of the line it is opened anew (see
-    :class:`LineOptions`) and the device started again; the decoder stays, so time goes on.
+    itself; ``reconnects`` how often the line came back; ``overruns``: bytes that the serial driver lost. After a fault
+    of the line it is opened anew (see :class:`LineOptions`) and the device started again; the decoder stays, so time
+    goes on.
     """
 
     def __init__(
         self,
         opener: Callable[[], AnyLine],
         *,
+        port: str,
         decoder: Decoder,
         host: Host,
         queue: EventQueue,
         options: LineOptions,
     ) -> None:
         super().__init__(name="link reader", daemon=True)
+        self._port = port
         self._open, self._decoder, self._host, self._queue, self._options = opener, decoder, host, queue, options
         self._stop_wanted = threading.Event()
         self.fault: str | None = None
         self.banner = ""
-        self.reconnects = 0
+        self.reconnects = self.overruns = 0
         self.notes: list[str] = []
         self.started = threading.Event()
 
@@ -79,6 +82,7 @@ class LinkReader(threading.Thread):
                 self.notes.append(f"{error}; opening it again")
                 self.reconnects += 1
             finally:
+                self.overruns += line.overruns()
                 line.close()
 
     def _connect(self) -> AnyLine | None:
@@ -93,11 +97,12 @@ class LinkReader(threading.Thread):
                     self.banner = self._host.start(line) or self.banner
                 self.started.set()
                 return line
-            except LinkError as error:
+            except LinkError as fault:
+                error = fault if fault.port else LinkError(self._port, fault.problem)
                 if line is not None:
                     line.close()
                 if not self.started.is_set():
-                    raise
+                    raise error from None
                 if time.monotonic() > deadline_s:
                     raise LinkError("", f"{error}, for {self._options.reconnect_s:g} s on") from None
             self._stop_wanted.wait(wait_s)

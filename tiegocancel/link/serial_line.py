@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import os
+import struct
+import sys
 import time
 from types import TracebackType
 from typing import Any, Self
@@ -15,6 +17,7 @@ from tiegocancel.link.line_options import LineOptions
 __all__ = ["SerialLine"]
 
 _SLICE_BYTES = 1024
+_TIOCGICOUNT = 0x545D
 _EMPTY_READS, _EMPTY_WAIT_S = 20, 0.001
 
 
@@ -46,6 +49,7 @@ class SerialLine:
             raise LinkError(port, f"cannot be opened: {_reason(port, error)}") from None
         self._descriptor = _descriptor_of(self._serial)
         self._empty_reads = 0
+        self._losses_before = _driver_losses(self._descriptor)
 
     def __enter__(self) -> Self:
         return self
@@ -101,6 +105,10 @@ class SerialLine:
         while self.read(1 << 16, 0.0) and time.monotonic() < deadline:
             pass
 
+    def overruns(self) -> int:
+        """Return how many bytes the driver says it lost since the port was opened; 0 where it does not say (Linux)."""
+        return max(_driver_losses(self._descriptor) - self._losses_before, 0)
+
     def close(self) -> None:
         """Close the port; a second call does nothing."""
         with contextlib.suppress(OSError, ValueError):
@@ -116,6 +124,20 @@ def _descriptor_of(port: Any) -> int | None:
     except (OSError, AttributeError, ValueError):
         return None
     return descriptor if isinstance(descriptor, int) else None
+
+
+def _driver_losses(descriptor: int | None) -> int:
+    """Return the driver's counts of overruns in the chip and in its buffer, as the kernel keeps them."""
+    if descriptor is None or not sys.platform.startswith("linux"):
+        return 0
+    import fcntl
+
+    counts = struct.Struct("20i")  # struct serial_icounter_struct of linux/serial.h
+    try:
+        answer = counts.unpack(fcntl.ioctl(descriptor, _TIOCGICOUNT, bytes(counts.size)))
+    except OSError:  # a pseudo-terminal, a socket
+        return 0
+    return int(answer[7] + answer[10])
 
 
 def _reason(port: str, error: Exception) -> str:

@@ -75,6 +75,7 @@ class LinkSource:
         self.events = 0
         self._reader = LinkReader(
             opener or (lambda: open_line(port, self._line)),
+            port=port,
             decoder=self.decoder,
             host=host or registry.host(protocol, options),
             queue=self.queue,
@@ -169,6 +170,7 @@ class LinkSource:
             "events": self.events,
             "rate_hz": self.rate_hz(),
             "reconnects": self.reconnects,
+            "driver_overruns": self._reader.overruns,
             "decoder": asdict(self.decoder.counters),
             "queue": {"policy": self.queue.options.policy, **self.queue.counters.to_json()},
             "latency": self.latency.to_json(),
@@ -179,6 +181,10 @@ class LinkSource:
         wire, queue = self.decoder.counters, self.queue.counters
         said = list(dict.fromkeys(self._reader.notes))
         for count, what in (
+            (
+                self._reader.overruns,
+                "bytes were lost in the serial driver: the machine was too slow, or no flow control",
+            ),
             (wire.bad_bytes, "bytes of the line belong to no event"),
             (wire.lost_frames, "frames were lost on the line"),
             (wire.lost_events, "events were lost on the line"),

@@ -66,6 +66,10 @@ class StreamLine:
     def drop_input(self) -> None:
         """Keep what has come: a file holds nothing but the stream."""
 
+    def overruns(self) -> int:
+        """Return 0: a file loses nothing."""
+        return 0
+
     def close(self) -> None:
         """Close the file; a second call does nothing."""
         if self._own:

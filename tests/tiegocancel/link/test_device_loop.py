@@ -24,6 +24,8 @@ from tiegocancel.link.protocols.protocol import Device
 from tiegocancel.link.pseudo_terminal import PseudoTerminal
 from tiegocancel.matching.oracle import OracleCanceller
 
+pytest.importorskip("cobs", reason="the framed protocol needs the extra link")
+
 CONFIG = CancelConfig(horizon_us=3000, tolerance_us=500, ring_capacity=4096)
 MOTION = MotionSchedule.rotation(center_px=(32.0, 24.0), omega_rad_s=20.0, horizon_us=3000)
 OPTIONS = ProtocolOptions(width=64, height=48)

@@ -245,3 +245,23 @@ def test_a_port_is_exclusive(serve: Serve, tiny: SimpleNamespace, line_options: 
 def test_settings_that_cannot_be_meant_are_refused(make: Callable[[], object], message: str) -> None:
     with pytest.raises(ConfigError, match=message):
         make()
+
+
+def test_a_device_that_does_not_answer_is_named(serve: Serve, tiny: SimpleNamespace, line_options: LineOptions) -> None:
+    class Deaf:
+        def start(self, line: object) -> str:
+            raise LinkError("", "the device does not answer")
+
+        def stop(self, line: object) -> None: ...
+
+    serving = serve(tiny.some_events(10))
+    link = tiny.source(serving.port, line_options, host=Deaf())
+    with pytest.raises(TiegoCancelError, match=rf"^{serving.port}: the device does not answer"):
+        tiny.received(link)
+
+
+def test_a_port_without_counters_of_its_driver_tells_no_overruns(
+    serve: Serve, line_options: LineOptions, tiny: SimpleNamespace
+) -> None:
+    with open_line(serve(tiny.some_events(10)).port, line_options) as line:
+        assert line.overruns() == 0
