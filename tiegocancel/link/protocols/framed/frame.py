@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from binascii import crc_hqx
 from enum import IntEnum
+from functools import cache
 from typing import Any, NamedTuple
 
 from tiegocancel.errors import MissingExtraError
@@ -62,6 +63,7 @@ def open_frame(encoded: bytes) -> Frame | None:
     return Frame(content[0] & 0xF, content[1], content[2:-2])
 
 
+@cache
 def _cobs() -> Any:
     try:
         from cobs import cobs

@@ -14,6 +14,8 @@ MOST_EVENTS = 128
 STEP_BITS = 20
 """A step of 2^20 ticks or more begins a new frame."""
 LEAST_BYTES = 9
+_PADDING = 64
+"""More than all flags of a frame, so that those of a short last one are read from somewhere."""
 _HEAD = np.dtype([("first", "<u2"), ("ticks", "<u4"), ("count", "u1"), ("form", "<u2")])
 _PLACE_WIDTHS = 13
 _ABSOLUTE = 15
@@ -83,7 +85,7 @@ def pack(columns: Columns, first: int, width: int, height: int) -> list[bytes]:
 
 def unpack(payloads: list[bytes], base_ticks: _Ints, width: int, height: int) -> Columns | None:
     """Return the events of frames whose first times, unwrapped, are ``base_ticks``; ``None`` where one is not sound."""
-    data = np.frombuffer(b"".join([*payloads, bytes(8)]), np.uint8)
+    data = np.frombuffer(b"".join([*payloads, bytes(_PADDING)]), np.uint8)
     size = np.array([len(payload) for payload in payloads])
     begin = np.cumsum(size) - size
     head = data[begin[:, None] + np.arange(_HEAD.itemsize)].reshape(-1).view(_HEAD)
@@ -97,14 +99,15 @@ def unpack(payloads: list[bytes], base_ticks: _Ints, width: int, height: int) ->
     longs, widths = [], []
     for shift, mask, flag, full in fields:
         short, mixed = form >> shift & mask, form >> flag & 1
-        absolute = (short == _ABSOLUTE) & (mask == _ABSOLUTE)
-        at = ahead[frame] + row
-        at = np.where(at < limit[frame], at, 0)
-        long = (data[at >> 3] >> (at & 7).astype(np.uint8) & 1).astype(np.bool_) & (mixed[frame] == 1)
-        long |= absolute[frame]
-        ahead = ahead + mixed * count
+        width, long = short[frame], ((short == _ABSOLUTE) & (mask == _ABSOLUTE))[frame]
+        if mixed.any():
+            # What would be read behind the frame is not used, and never behind the padding.
+            at = ahead[frame] + row
+            flag_set = data[at >> 3] >> (at & 7).astype(np.uint8) & mixed.astype(np.uint8)[frame]
+            long = long | flag_set.astype(np.bool_)
+            ahead = ahead + mixed * count
         longs.append(long)
-        widths.append(np.where(long, full, short[frame]))
+        widths.append(np.where(long, full, width))
     bits = 1 + widths[0] + widths[1] + widths[2]
     behind = np.cumsum(bits) - bits
     at = ahead[frame] + behind - behind[starts[frame]]

@@ -73,8 +73,8 @@ class OpenMvDecoder(AlignedDecoder):
         text = rows if sound.all() else np.where(sound[:, None], rows, ord("A"))
         numbers = np.frombuffer(a2b_base64(text.astype(np.uint8).tobytes()), "<u2").reshape(-1, 6)
         kind, seconds, ms, us, x, y = numbers.T
-        sound &= (kind <= _OTHER_KIND) & (ms < 1000) & (us < 1000)
-        sound &= (kind > 1) | ((x < self._columns) & (y < self._rows))
+        sound = sound & (kind <= _OTHER_KIND) & (ms < 1000) & (us < 1000)
+        sound = sound & ((kind > 1) | ((x < self._columns) & (y < self._rows)))
         return _Fields(sound, kind, (seconds.astype(np.int64) * 1000 + ms) * 1000 + us, x, y)
 
     def _fits(self, rows: NDArray[np.uint8]) -> NDArray[np.bool_]:
