@@ -16,6 +16,7 @@ from tiegocancel.link.protocols.protocol import Device
 __all__ = ["DeviceLine", "Emulator", "repeated"]
 
 _IDLE_S = 0.01
+_CREDIT_S = 0.001
 _PAUSE_US = 1000
 _COMMANDS = re.compile(rb"[^\n\0]*[\n\0]?", re.DOTALL)
 """Commands end with a line or, in a framed protocol, with a zero byte."""
@@ -92,12 +93,20 @@ class Emulator:
             going &= not self._stopped() and self._streams() and (self._at_once or not self._restart)
             if not rest:
                 self._answer()
-                return going
+                if not going or self._has_credit():
+                    return going
+                time.sleep(_CREDIT_S)
+                continue
             taken = self.line.write_some(bytes(rest), _IDLE_S)
             rest = rest[taken:]
             if not going and not taken:
                 # The host reads no more. Otherwise the event under way is finished, as a device does.
                 return False
+
+    def _has_credit(self) -> bool:
+        """Tell whether the host still takes frames, of a protocol with credits (see ``FramedDevice.allowance``)."""
+        allowance: int | None = getattr(self.device, "allowance", None)
+        return allowance is None or allowance > 0
 
     def _listen(self, timeout_s: float) -> None:
         """Take commands; the replies wait for a place between events."""

@@ -224,3 +224,42 @@ def test_a_device_killed_at_random_is_told(tiny: SimpleNamespace, line_options: 
 @pytest.mark.slow
 def test_a_hundred_devices_killed_at_random_are_told(tiny: SimpleNamespace, line_options: LineOptions) -> None:
     killed_devices(tiny, replace(line_options, reconnect_s=0.0), 100)
+
+
+def test_a_device_sends_no_more_than_its_credit(tiny: SimpleNamespace, line_options: LineOptions) -> None:
+    pytest.importorskip("cobs", reason="the framed protocol needs the extra link")
+    from tiegocancel.link.opening import open_line
+    from tiegocancel.link.protocols import registry
+    from tiegocancel.link.protocols.framed import FramedDecoder, FramedHost
+    from tiegocancel.link.protocols.options import ProtocolOptions
+
+    options = ProtocolOptions(width=64, height=48)
+    events = tiny.some_events(2000, step_us=100)  # 20 events a piece of 2 ms: one frame
+    stopped = threading.Event()
+    with PseudoTerminal() as device:
+        emulator = Emulator(
+            device, registry.device("framed", options), lambda: [events], pace=Pace(speed=0.5), stopped=stopped.is_set
+        )
+        thread = threading.Thread(target=emulator.serve)
+        thread.start()
+        host, decoder = FramedHost(options, credit=5), FramedDecoder(options)
+        got: list[Events] = []
+
+        def hear(seconds: float) -> int:
+            end = time.monotonic() + seconds
+            while time.monotonic() < end:
+                got.append(decoder.feed(line.read(4096, 0.05)))
+            return decoder.frames
+
+        with open_line(device.port, line_options) as line:
+            host.start(line)
+            assert hear(0.4) == 5
+            line.write(host.grant(12))
+            assert hear(0.4) == 12
+            line.write(host.grant(1000))
+            deadline = time.monotonic() + 10.0
+            while sum(map(len, got)) < 2000 and time.monotonic() < deadline:
+                hear(0.05)
+        stopped.set()
+        thread.join(5.0)
+    assert tiny.equal(Events.concatenate([part for part in got if len(part)]), events)
