@@ -91,6 +91,9 @@ def _check(args: argparse.Namespace, settings: Settings) -> None:
         raise ConfigError(f"{args.source} is a port: say what it speaks with --protocol")
     if settings.motion.source.strip().lower() == "fit":
         raise ConfigError("--motion fit: looks at a recording beforehand; on a link use track, gyro, numbers or a file")
+    for name in ("undistort", "time_unit", "columns", "format"):
+        if getattr(settings.read, name) is not None:
+            raise ConfigError(f"--{name.replace('_', '-')}: says how a recording is read, and serves no link")
     if settings.motion.refine:
         raise ConfigError("--refine: looks at a recording beforehand, and a link has none")
     if args.to is not None:

@@ -169,6 +169,7 @@ def test_a_line_that_is_too_slow_is_told(recording: Path, tmp_path: Path, capsys
     [
         (["run", "/dev/ttyUSB7"], "/dev/ttyUSB7 is a port: say what it speaks with --protocol"),
         (["run", "socket://localhost:1", "--protocol", "edvs", "--motion", "fit"], "--motion fit: looks at"),
+        (["run", "-", "--protocol", "edvs", "--undistort", "lens.toml"], "--undistort: says how a recording is read"),
         (["run", "-", "--protocol", "edvs", "--refine"], "--refine: looks at"),
         (["run", "-", "--protocol", "edsv"], "did you mean edvs?"),
         (["run", "-", "--protocol", "edvs", "--max-events", "0"], "--max-events must be at least 1"),
