@@ -35,7 +35,7 @@ class Outbox:
     def put(self, t: NDArray[np.int64], x: NDArray[Any], y: NDArray[Any], p: NDArray[Any]) -> None:
         """Add columns [n] as the device sent them."""
         if len(t):
-            t = t + self._ahead_us
+            t = t + self._ahead_us if self._ahead_us else t
             self.time_us = int(t[-1])
             self._parts.append((t, x, y, p))
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import struct
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,6 +19,7 @@ __all__ = ["FramedDecoder"]
 
 _STAMP_MASK, _STAMP_HALF = (1 << 32) - 1, 1 << 31
 _FRAMES_AT_ONCE = 256
+_HEAD = struct.Struct("<HIB")
 _MOST_DECISIONS = 4096
 
 
@@ -133,7 +136,7 @@ class FramedDecoder:
     def _take_events(self, payload: bytes) -> bool:
         if len(payload) < LEAST_BYTES or not 1 <= payload[6] <= MOST_EVENTS:
             return False
-        first, count = int.from_bytes(payload[:2], "little"), payload[6]
+        first, stamp, count = _HEAD.unpack_from(payload)
         if not self._known:
             self.counters.lost_events += count
             self.counters.lost_frames += 1
@@ -142,7 +145,6 @@ class FramedDecoder:
         if self._event is not None:
             self.counters.lost_events += (first - self._event) & 0xFFFF
         self._event = (first + count) & 0xFFFF
-        stamp = int.from_bytes(payload[2:6], "little")
         ticks = stamp if self._ticks is None else self._ticks + ((stamp - self._ticks) & _STAMP_MASK)
         if self._ticks is not None and ticks - self._ticks >= _STAMP_HALF:
             # A step back without a HELLO that says so: frames of a run before this one, or of none.
@@ -185,4 +187,5 @@ class FramedDecoder:
             self.counters.bad_bytes += len(payloads[0])
             self.counters.lost_events += payloads[0][6]
             return
-        self._outbox.put(columns.ticks * self._tick_ns // 1000, columns.x, columns.y, columns.p.astype(np.uint8))
+        times = columns.ticks if self._tick_ns == 1000 else columns.ticks * self._tick_ns // 1000
+        self._outbox.put(times, columns.x, columns.y, columns.p.astype(np.uint8))

@@ -111,7 +111,9 @@ def unpack(payloads: list[bytes], base_ticks: _Ints, width: int, height: int) ->
     bits = 1 + widths[0] + widths[1] + widths[2]
     behind = np.cumsum(bits) - bits
     at = ahead[frame] + behind - behind[starts[frame]]
-    if ((at + bits) > limit[frame]).any() or (count == 0).any() or int(bits.max()) > 57:
+    # Records follow each other: a frame is whole when its last one is.
+    ends = np.append(starts[1:], len(frame)) - 1
+    if ((at[ends] + bits[ends]) > limit).any() or (count == 0).any() or int(bits.max()) > 57:
         return None
     # Eight bytes from any byte on: a record of up to 57 bits lies in them whole.
     eight = np.ndarray((len(data) - 7,), "<u8", data, strides=(1,))
