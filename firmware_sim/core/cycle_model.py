@@ -202,7 +202,7 @@ class CycleModel:
         if self.plan.interlocked and any(self._clash(op, other) for other in self._under_way):
             return "clash"
         self._stages.popleft()
-        slots = {MATCH: self.plan.match_slots, WRITE: self.plan.pass_slots, _SCRUB: 1}[op.kind]
+        slots = {MATCH: self.plan.match_slots, WRITE: self.plan.pass_slots, _SCRUB: self.plan.scrub_slots}[op.kind]
         if self.plan.cached and op.kind != _SCRUB:
             slots = self._cache(op)
         op.commit = self.cycle + slots - 1 + self.plan.tail

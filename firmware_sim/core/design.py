@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 from tiegocancel.firmware_sim.core.config import CoreConfig, window_shape
@@ -10,6 +11,7 @@ from tiegocancel.firmware_sim.core.timing import fastest_scrub
 from tiegocancel.firmware_sim.logic import LogicShape
 from tiegocancel.firmware_sim.memory_map import LogicalMemory
 from tiegocancel.firmware_sim.state import StateBits, state_bits
+from tiegocancel.firmware_sim.target_memory import ExternalMemory
 
 from tiegocancel.matching.config import CancelConfig
 
@@ -27,6 +29,8 @@ class CoreDesign:
     """One core for one configuration on one sensor at one clock.
 
     ``time_bits``: width of a cell's stamp, 0 for the narrowest whose sweep takes at most 5 % of the cycles.
+    ``external``: the memory that holds the table where the core says ``external``; a line missed takes as long as the
+    chip takes for a closed row, in cycles of the core, instead of ``core.miss_cycles``.
     """
 
     core: CoreConfig
@@ -35,6 +39,14 @@ class CoreDesign:
     height: int
     clock_hz: float
     time_bits: int = 0
+    external: ExternalMemory | None = None
+
+    def __post_init__(self) -> None:
+        if self.external is not None and self.core.table_memory == "external":
+            cell_bytes = -(-state_bits(self.cancel, width=self.width, height=self.height).cell // 8)
+            nanoseconds = self.external.access_ns(self.core.line_cells * cell_bytes)
+            cycles = max(math.ceil(nanoseconds * self.clock_hz * 1e-9 / (1.0 - self.external.refresh_share)), 1)
+            object.__setattr__(self, "core", replace(self.core, miss_cycles=cycles))
 
     @cached_property
     def state(self) -> StateBits:
@@ -80,6 +92,11 @@ class CoreDesign:
     def scrub_cycles(self) -> int:
         """Cycles between two words of the sweep that hides aliases of the stamps."""
         return self._scrub_cycles(self.stamp_bits)
+
+    @property
+    def sweep_ticks(self) -> int:
+        """Ticks within which every cell must be looked at once."""
+        return (1 << self.stamp_bits) - self._gate_ticks
 
     @property
     def reads_ways(self) -> int:

@@ -144,6 +144,18 @@ def fit_constraints(
                 note=f"of {have:,}; ± {logic.error_share:.0%}",
             )
         )
+    if design.external is not None and design.core.table_memory == "external":
+        found.append(
+            Constraint(
+                name="external memory",
+                kind="fit",
+                need=design.state.cells * -(-design.state.cell // 8),
+                have=design.external.bytes,
+                unit="bytes",
+                evidence="datasheet",
+                note=f"{design.external.part}; a line missed takes {design.core.miss_cycles} cycles",
+            )
+        )
     fastest = max(clock.mhz for clock in target.clocks)
     if abs(design.clock_hz - target.clock.mhz * 1e6) > 1:  # the part's own clock leaves no margin by definition
         found.append(
@@ -196,7 +208,7 @@ def _sweep(design: CoreDesign, outcome: Outcome) -> Constraint:
         have=design.clock_hz * (1.0 - busy) / service,
         unit="words/s",
         evidence="simulated",
-        note=f"{design.stamp_bits}-bit stamps, {design.table_words:,} words in {design.state.sweep_ticks:,} ticks",
+        note=f"{design.stamp_bits}-bit stamps, {design.table_words:,} words in {design.sweep_ticks:,} ticks",
     )
 
 

@@ -18,19 +18,24 @@ from tiegocancel.events import Events
 from tiegocancel.matching.selective import Schedules
 from tiegocancel.motion.schedule import MotionSchedule
 
-__all__ = ["choose_core", "ladder"]
+__all__ = ["choose_core", "fits", "ladder", "rungs"]
 
 _DEEPEST_INPUT = 1 << 14
 _ENOUGH_RATE = 0.98
 
 
-def ladder(base: CoreConfig) -> Iterator[CoreConfig]:
-    """Yield micro-architectures, the simplest first: each rung costs more logic or banks and takes fewer cycles."""
+def ladder(base: CoreConfig, *, external: bool = False) -> Iterator[CoreConfig]:
+    """Yield micro-architectures, the simplest first: each rung costs more logic or banks and takes fewer cycles.
+
+    A table in an external memory, where there is one, comes last: it asks for a chip more.
+    """
     yield replace(base, lookup="serial", overlap="none", lanes=1, table_memory="block")
     yield replace(base, lookup="serial", overlap="none", lanes=1, table_memory="single_port")
     yield replace(base, lookup="serial", overlap="forward", lanes=1, table_memory="block")
     yield replace(base, lookup="row", overlap="forward", lanes=1, table_memory="block")
     yield replace(base, lookup="banked", overlap="forward", lanes=1, table_memory="block")
+    if external:
+        yield replace(base, lookup="serial", overlap="none", lanes=1, table_memory="external")
 
 
 def choose_core(
@@ -47,8 +52,7 @@ def choose_core(
     ``fixed`` judges ``base.core`` alone. A core that could keep up but drops events for want of a deeper input FIFO is
     given one, up to 16,384 events.
     """
-    rungs = [base.core] if fixed else list(ladder(base.core))
-    designs = [replace(base, core=core) for core in rungs]
+    designs = rungs(base, fixed=fixed)
     fitting = [design for design in designs if fits(design, target, motion)]
     best: Verdict | None = None
     for design in fitting or designs[:1]:
@@ -61,6 +65,12 @@ def choose_core(
             best = verdict
     assert best is not None
     return best
+
+
+def rungs(base: CoreDesign, *, fixed: bool = False) -> list[CoreDesign]:
+    """Return the designs to try for a base: its own core alone when ``fixed``."""
+    cores = [base.core] if fixed else list(ladder(base.core, external=base.external is not None))
+    return [replace(base, core=core) for core in cores]
 
 
 def fits(design: CoreDesign, target: FpgaTarget, motion: MotionSchedule | Schedules) -> bool:

@@ -14,7 +14,8 @@ R3 **Issue.** One operation a cycle, in program order, not before ``S``. After a
    match that stored it. A match issues while fewer than ``output_depth`` matches are undecided or have left a residual
    in the output FIFO, at the start of the cycle (credits).
 R4 **Scrub.** Every ``scrub_cycles`` a request to look at one word in every lane is raised; pending requests issue
-   before anything else that could issue in the same cycle.
+   before anything else that could issue in the same cycle. It takes one slot; behind a cache, which it goes round, also
+   its share ``⌈miss_cycles / line_cells⌉`` of streaming the line.
 R5 **Places.** From issue to the table lie ``drain_depth`` stages (``map_depth`` where ring entries hold events, 0 where
    they hold predictions: the plain rule), elastic and in order; ``drain_depth + 1`` operations are under way at most.
 R6 **Table.** One operation enters a cycle, in order, when every lane that it touches is free. A pass reads its set in
@@ -82,6 +83,7 @@ class Plan(NamedTuple):
     match_slots: int
     tail: int  # cycles from the last slot to the commit
     scrub_cycles: int
+    scrub_slots: int
     link: int  # 2^-16 cycles for each residual, 0 for as many as come
     cached: int
     line_cells: int
@@ -109,7 +111,12 @@ class Clock(NamedTuple):
 
 def fastest_scrub(core: CoreConfig) -> int:
     """Return the least cycles between two words of the sweep: twice what one of them takes."""
-    return 2 * (core.read_latency + core.select_depth + 1)
+    return 2 * (core.read_latency + core.select_depth + scrub_slots(core))
+
+
+def scrub_slots(core: CoreConfig) -> int:
+    """Return the slots of one word of the sweep: one, and behind a cache its share of the line that is streamed."""
+    return 1 + (-(-core.miss_cycles // core.line_cells) if core.table_memory == "external" else 0)
 
 
 def lay_out_plan(core: CoreConfig, cancel: CancelConfig, *, scrub_cycles: int, link_q16: int) -> Plan:
@@ -145,6 +152,7 @@ def lay_out_plan(core: CoreConfig, cancel: CancelConfig, *, scrub_cycles: int, l
         match_slots=read * {"serial": bins, "row": rows, "banked": 1}[core.lookup],
         tail=core.read_latency + core.select_depth,
         scrub_cycles=scrub_cycles,
+        scrub_slots=scrub_slots(core),
         link=link_q16,
         cached=int(core.table_memory == "external"),
         line_cells=core.line_cells,
@@ -342,19 +350,19 @@ def _scrub(rule: Rule, plan: Plan, clock: Clock, until: int, ops: NDArray[np.int
     for lane in range(plan.lanes):
         idle = max(idle, clock.lane_free[lane])
     spare = (until - now[NEXT_SCRUB]) // plan.scrub_cycles - 2
-    quick = plan.scrub_cycles > plan.drain_depth + plan.tail + 2
+    quick = plan.scrub_cycles > plan.drain_depth + plan.tail + plan.scrub_slots + 1
     if quick and spare > 0 and now[NEXT_SCRUB] > idle + plan.tail + plan.drain_depth:
         now[NEXT_SCRUB] += spare * plan.scrub_cycles
         clock.work[WORK_SCRUBS] += spare
-        clock.work[WORK_READS] += spare
+        clock.work[WORK_READS] += spare * plan.scrub_slots
     at = max(now[NEXT_SCRUB], now[LAST_ISSUE] + now[GAP], clock.entries[now[OPS] % room] + 1)
     if at > until:
         return False
-    _enter(rule, plan, clock, at, SCRUB, ops, 0, 1)
+    _enter(rule, plan, clock, at, SCRUB, ops, 0, plan.scrub_slots)
     now[LAST_ISSUE], now[GAP] = at, 1
     now[NEXT_SCRUB] += plan.scrub_cycles
     clock.work[WORK_SCRUBS] += 1
-    clock.work[WORK_READS] += 1
+    clock.work[WORK_READS] += plan.scrub_slots
     return True
 
 

@@ -64,6 +64,7 @@ def add_parser(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
     group.add_argument("--output-link", type=float, metavar="BIT_S", help="line out of the part")
     group.add_argument("--input-bits", type=float, metavar="B", help="bits of an event on the line in (32)")
     group.add_argument("--output-bits", type=float, metavar="B", help="bits of an event on the line out (32)")
+    group.add_argument("--external-memory", metavar="NAME|FILE", help="chip that may hold an FPGA's table: hyperram, …")
     group.add_argument("--max-latency-us", type=float, metavar="US", help="latest decision that is soon enough")
     group.add_argument(
         "--no-changes", dest="changes", action="store_false", default=None, help="do not look for changes"

@@ -67,6 +67,7 @@ _KEYS = {
     "most_events": ("budget", "most_events"),
     "clock_mhz": ("budget", "clock_mhz"),
     "architecture": ("budget", "architecture"),
+    "external_memory": ("budget", "external_memory"),
     "readout": ("budget", "readout_events_per_second"),
     "input_link": ("budget", "input_link_bits_per_second"),
     "output_link": ("budget", "output_link_bits_per_second"),

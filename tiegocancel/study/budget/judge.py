@@ -8,7 +8,7 @@ from typing import Any
 
 from tiegocancel.firmware_sim.core.config import CoreConfig
 from tiegocancel.firmware_sim.core.simulator import narrowed
-from tiegocancel.firmware_sim.target import Target
+from tiegocancel.firmware_sim.target import Target, load_memory
 from tiegocancel.firmware_sim.verdict import Verdict
 from tiegocancel.matching.canceller import Canceller
 from tiegocancel.matching.config import CancelConfig
@@ -78,6 +78,7 @@ def judge_target(
         offer_of(settings, target),
         settings.clock_mhz * 1e6,
         settings.architecture == "fixed",
+        external=load_memory(settings.external_memory) if settings.external_memory else None,
     )
     say(f"{target.name}: simulating")
     verdict = subject.judge(target)

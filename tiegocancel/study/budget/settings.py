@@ -12,6 +12,7 @@ __all__ = ["BudgetSettings"]
 class BudgetSettings:
     """Assume links, sensor and clock; see ``firmware_sim.arrival.InputPath`` and ``firmware_sim.offer.Offer``.
 
+    ``external_memory``: name or file of a memory chip that may hold the table of an FPGA; none when empty.
     ``most_events`` of the recording are simulated, from its beginning. ``clock_mhz``: 0 is what the part is known to
     reach. ``architecture``: ``auto`` takes the simplest core that passes, ``fixed`` the one of ``[core]``. A link of 0
     bits a second is as wide as it takes; on a microcontroller it is the fastest link of the part. ``changes``: look for
@@ -28,6 +29,7 @@ class BudgetSettings:
     output_link_bits_per_second: float = 0.0
     output_bits_per_event: float = 32.0
     max_latency_us: float = 0.0
+    external_memory: str = ""
     changes: bool = True
     most_changes: int = 5
 

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from tiegocancel.firmware_sim.arrival import InputPath
 from tiegocancel.firmware_sim.core.config import CoreConfig
 from tiegocancel.firmware_sim.core.design import CoreDesign
-from tiegocancel.firmware_sim.core.ladder import choose_core, fits
+from tiegocancel.firmware_sim.core.ladder import choose_core, fits, rungs
 from tiegocancel.firmware_sim.offer import Offer
 from tiegocancel.firmware_sim.target import Target
 from tiegocancel.firmware_sim.target_fpga import FpgaTarget
+from tiegocancel.firmware_sim.target_memory import ExternalMemory
 from tiegocancel.firmware_sim.verdict import Verdict
 from tiegocancel.matching.config import CancelConfig
 from tiegocancel.study.budget.ground import Ground
@@ -30,6 +31,7 @@ class Subject:
     clock_hz: float
     fixed: bool
     time_bits: int = 0
+    external: ExternalMemory | None = None
 
     def narrowest_stamp_bits(self, clock_hz: float) -> int:
         """Return the narrowest stamps of cells whose sweep a core has time for."""
@@ -57,11 +59,8 @@ class Subject:
         """Tell, without simulating, whether any way of building it fits a part."""
         motion = self.ground.motion(self.cancel)
         if isinstance(target, FpgaTarget):
-            from tiegocancel.firmware_sim.core.ladder import ladder
-
             base = self._design(self.clock_hz or target.clock.mhz * 1e6)
-            rungs = [self.core] if self.fixed else list(ladder(self.core))
-            return any(fits(replace(base, core=core), target, motion) for core in rungs)
+            return any(fits(design, target, motion) for design in rungs(base, fixed=self.fixed))
         from tiegocancel.firmware_sim.mcu.judge import fits_mcu
 
         events = self.ground.events
@@ -69,7 +68,7 @@ class Subject:
 
     def _design(self, clock_hz: float) -> CoreDesign:
         events = self.ground.events
-        return CoreDesign(self.core, self.cancel, events.width, events.height, clock_hz, self.time_bits)
+        return CoreDesign(self.core, self.cancel, events.width, events.height, clock_hz, self.time_bits, self.external)
 
 
 def offer_of(settings: BudgetSettings, target: Target) -> Offer:
