@@ -25,9 +25,7 @@ _NEXT_LINE = re.compile(rb"(\r?\nC \d{1,6} |C \d{1,6} )[A-Za-z0-9+/]{16}")
 _DATA = re.compile(r"[A-Za-z0-9+/]{8,}={0,2}|C \d+.*")
 _ROW_BYTES = 16
 """An event is 6 numbers of 16 bits, 12 bytes, and so 16 characters of base64 for itself."""
-_ALPHABET = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/"
-_VALUE = np.full(256, 255, np.uint8)
-_VALUE[np.frombuffer(_ALPHABET, np.uint8)] = np.arange(64, dtype=np.uint8)
+_BASE64 = re.compile(rb"[A-Za-z0-9+/]*")
 _OTHER_KIND = 5
 _ROW_BITS, _PAUSE_BITS, _JUMP_BITS = 30.0, 30.0, 145.0
 _PLAIN_US = 16_384
@@ -66,20 +64,25 @@ class OpenMvDecoder(AlignedDecoder):
         self._clock_us: int | None = None
         self._time_us = 0
         self._told = self._came = 0
-        self._seen = self._fields(np.zeros((0, _ROW_BYTES), np.uint8))
+        self._seen = self._fields(b"")
 
-    def _fields(self, rows: NDArray[np.uint8]) -> _Fields:
-        sound: NDArray[np.bool_] = (_VALUE[rows] < 64).all(axis=1)
-        text = rows if sound.all() else np.where(sound[:, None], rows, ord("A"))
-        numbers = np.frombuffer(a2b_base64(text.astype(np.uint8).tobytes()), "<u2").reshape(-1, 6)
+    def _fields(self, text: bytes) -> _Fields:
+        """Read rows of characters that are all of base64."""
+        numbers = np.frombuffer(a2b_base64(text), "<u2").reshape(-1, 6)
         kind, seconds, ms, us, x, y = numbers.T
-        sound = sound & (kind <= _OTHER_KIND) & (ms < 1000) & (us < 1000)
-        sound = sound & ((kind > 1) | ((x < self._columns) & (y < self._rows)))
+        on_sensor = (kind > 1) | ((x < self._columns) & (y < self._rows))
+        sound: NDArray[np.bool_] = (kind <= _OTHER_KIND) & (ms < 1000) & (us < 1000) & on_sensor
         return _Fields(sound, kind, (seconds.astype(np.int64) * 1000 + ms) * 1000 + us, x, y)
 
     def _fits(self, rows: NDArray[np.uint8]) -> NDArray[np.bool_]:
-        self._seen = fields = self._fields(rows)
-        return fields.sound & (self._steps(fields.clock_us) <= self.options.max_jump_us)
+        text = rows.tobytes()
+        # Behind the first character that is none of base64 no row of this block can follow.
+        whole = _base64_bytes(text) // _ROW_BYTES
+        self._seen = self._fields(text[: whole * _ROW_BYTES])
+        fits = np.zeros(len(rows), np.bool_)
+        if whole:
+            fits[:whole] = self._seen.sound & (self._steps(self._seen.clock_us) <= self.options.max_jump_us)
+        return fits
 
     def _steps(self, clock_us: NDArray[np.int64]) -> NDArray[np.int64]:
         first = int(clock_us[0]) if self._clock_us is None else self._clock_us
@@ -87,7 +90,7 @@ class OpenMvDecoder(AlignedDecoder):
 
     def _take(self, rows: NDArray[np.uint8], *, searched: bool) -> None:
         # Blocks that were not searched are the beginning of what was just looked at.
-        fields = self._fields(rows) if searched else self._seen.head(len(rows))
+        fields = self._fields(rows.tobytes()) if searched else self._seen.head(len(rows))
         if self._clock_us is None:
             self._time_us = int(fields.clock_us[0])
         steps = self._steps(fields.clock_us)
@@ -155,11 +158,10 @@ class OpenMvDecoder(AlignedDecoder):
     def _goes_on(self, rows: bytes) -> bool:
         if self._clock_us is None:
             return True
-        whole = len(rows) // _ROW_BYTES * _ROW_BYTES
-        fields = self._fields(np.frombuffer(rows[:whole], np.uint8).reshape(-1, _ROW_BYTES))
-        steps = (fields.clock_us - self._clock_us) % _PERIOD_US
+        clocks = [self._clock_of(rows[at : at + _ROW_BYTES]) for at in range(0, len(rows), _ROW_BYTES)]
+        steps = [(clock - self._clock_us) % _PERIOD_US for clock in clocks if clock is not None]
         # Two rows between the last event and this one say that it is this one whose time was spoilt.
-        return int(np.count_nonzero(fields.sound[1:] & (steps[1:] < steps[0]))) < 2
+        return clocks[0] is None or sum(step < steps[0] for step in steps[1:]) < 2
 
     def _waits(self, data: bytes, place: int) -> bool:
         return self._text_waits(data, place)
@@ -183,3 +185,9 @@ class OpenMvDecoder(AlignedDecoder):
         """Count what is missing of the line before, and begin one of ``told`` events."""
         self.counters.lost_events += max(self._told - self._came, 0)
         self._told, self._came = told, 0
+
+
+def _base64_bytes(text: bytes) -> int:
+    """Return how many characters from the start of ``text`` on are of base64."""
+    found = _BASE64.match(text)
+    return found.end() if found else 0
