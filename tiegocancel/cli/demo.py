@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
+import sys
+from typing import TYPE_CHECKING, Any
 
 from tiegocancel.cli.settings import add_cancel_options, add_estimate_options, add_output_options, settings_from
+
+if TYPE_CHECKING:
+    from tiegocancel.study.settings import Settings
 
 __all__ = ["DEMO", "add_parser", "run"]
 
@@ -18,6 +22,12 @@ DEMO: dict[str, dict[str, Any]] = {
 """The demo's operating point, as a configuration file would say it."""
 
 _FIT_SAMPLE_S = 0.1
+
+_PARTS = ("ecp5-45f", "rp2040")
+"""Parts that the demo judges: one that takes the scene's 3.8 Mev/s, and one that does not."""
+_JUDGED_S = 0.012
+"""Longer than the horizon of the preset that they are judged with, so that rings and table are at work."""
+_JUDGED_PRESET = "lean"
 
 
 def add_parser(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -33,6 +43,9 @@ def add_parser(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
     add_cancel_options(parser)
     add_estimate_options(parser)
     add_output_options(parser)
+    parser.add_argument(
+        "--no-budget", dest="budget", action="store_false", default=True, help="do not judge two parts on the scene"
+    )
     parser.set_defaults(run=run)
 
 
@@ -63,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
     session = Session(
         args, settings, title="Built-in scene: a textured disc and a mover", inputs=motion_inputs(settings)
     )
-    return session.run(
+    code = session.run(
         simulate(scene, duration_s=duration_s, seed=seed),
         found,
         width=scene.width,
@@ -74,3 +87,43 @@ def run(args: argparse.Namespace) -> int:
         expected_us=round(duration_s * 1e6),
         photograph=photograph(scene, time_s=duration_s / 2),
     )
+    if code == 0 and args.budget and not args.json:
+        sys.stdout.write(_budget(settings))
+    return code
+
+
+def _budget(settings: Settings) -> str:
+    """Return the verdicts on two parts for the first milliseconds of the scene, as a table."""
+    from dataclasses import replace
+
+    from tiegocancel.cli.progress import event_progress
+    from tiegocancel.firmware_sim.target import load_target
+    from tiegocancel.matching.config import CancelConfig
+    from tiegocancel.matching.presets import preset_table
+    from tiegocancel.scene import ground_truth, simulate
+    from tiegocancel.study.budget.ground import gather
+    from tiegocancel.study.budget.judge import judge_target
+    from tiegocancel.study.budget.text import comparison
+    from tiegocancel.study.feed import FixedMotion
+
+    scene, seed = settings.scene, settings.simulate.seed
+    table = preset_table(_JUDGED_PRESET, "demo")
+    cancel = CancelConfig(**{**table, "set_bits": tuple(table["set_bits"])})
+    ground = gather(
+        simulate(scene, duration_s=_JUDGED_S, seed=seed),
+        FixedMotion(ground_truth(scene, duration_s=_JUDGED_S)),
+        most=settings.budget.most_events,
+        step_us=settings.motion.schedule_step_us,
+    )
+    if ground is None:
+        return ""
+    core, budget = replace(settings.core, input_depth=1024), replace(settings.budget, changes=False)
+    judged = []
+    for name in _PARTS:
+        with event_progress(f"judging {name}", None):
+            judged.append(judge_target(ground, load_target(name), cancel, core, budget))
+    head = (
+        f"\ntwo parts on the first {_JUDGED_S * 1e3:g} ms ({len(ground.events):,} events), preset {_JUDGED_PRESET}; "
+        "tiegocancel budget tells more:\n"
+    )
+    return head + comparison(judged, cancelled=False)

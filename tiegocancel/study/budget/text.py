@@ -48,11 +48,12 @@ def verdict_text(one: Judged) -> str:
     return "\n".join(lines) + "\n"
 
 
-def comparison(judged: list[Judged]) -> str:
-    """Return a line a part."""
+def comparison(judged: list[Judged], *, cancelled: bool = True) -> str:
+    """Return a line a part, with what it cancels where the stretch is long enough for that to be ``cancelled``."""
+    shares = f"{'CR':>7}{'J':>7}" if cancelled else ""
     header = (
         f"{'part':<16}{'fits':<6}{'keeps up':<10}{'binding':<24}{'margin':>8}{'max Mev/s':>11}{'p50 (µs)':>10}"
-        f"{'max (µs)':>10}{'drops':>9}{'CR':>7}{'J':>7}  with"
+        f"{'max (µs)':>10}{'drops':>9}{shares}  with"
     )
     lines = [header]
     for one in judged:
@@ -63,11 +64,12 @@ def comparison(judged: list[Judged]) -> str:
             p50, most = (f"{value * 1e-3:.2f}" for value in (outcome.latency_ns.p50, outcome.latency_ns.most))
         ratio = "-" if one.cancelled is None else f"{one.cancelled.ratio:.3f}"
         j = None if one.cancelled is None else one.cancelled.selectivity
+        worth = f"{ratio:>7}{'-' if j is None else f'{j:.3f}':>7}" if cancelled else ""
         best = f"passes with {one.changes[0].name}" if one.changes else ""
         lines.append(
             f"{verdict.target:<16}{_word(verdict.fits):<6}{_word(verdict.keeps_up):<10}{verdict.binding.name:<24}"
-            f"{_margin(verdict.binding.margin):>8}{rate:>11}{p50:>10}{most:>10}{drops:>9}{ratio:>7}"
-            f"{'-' if j is None else f'{j:.3f}':>7}  {verdict.design if verdict.passes else best}"
+            f"{_margin(verdict.binding.margin):>8}{rate:>11}{p50:>10}{most:>10}{drops:>9}{worth}"
+            f"  {verdict.design if verdict.passes else best}"
         )
     return "\n".join(lines) + "\n"
 
