@@ -147,6 +147,19 @@ def test_a_device_that_starts_anew_is_told_by_its_session() -> None:
     assert (decoder.counters.lost_frames, decoder.counters.lost_events, decoder.counters.time_jumps) == (0, 0, 1)
 
 
+def test_a_device_that_is_started_again_begins_a_session_and_says_its_size_first() -> None:
+    device = registry.device("framed", ProtocolOptions())
+    decoder = FramedDecoder(ProtocolOptions())
+    runs = []
+    for seed in (1, 2, 3):
+        encoder = device.encoder()
+        run = stream(seed, 40, start_us=5_000_000)
+        runs.append(decoder.feed(encoder.begin() + encoder.encode(run)))
+        assert rows(runs[-1]) == [(t - 5_000_000 + int(runs[-1].t[0]), *rest) for t, *rest in rows(run)]
+    assert rows(Events.concatenate(runs))[0][0] == 5_000_000
+    assert (decoder.counters.lost_frames, decoder.counters.lost_events, decoder.counters.time_jumps) == (0, 0, 2)
+
+
 def test_decisions_come_back_in_order_and_a_gap_shows() -> None:
     encoder = FramedEncoder(SMALL)
     rng = np.random.default_rng(1)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from tiegocancel.errors import ConfigError
 from tiegocancel.events import Events
+from tiegocancel.link.protocols.axes import to_device
 from tiegocancel.link.protocols.edvs.layout import SIDE_PX, stamp_bytes
 from tiegocancel.link.protocols.options import ProtocolOptions
 
@@ -111,13 +112,8 @@ class EdvsEncoder:
 
     def _heads(self, events: Events) -> NDArray[np.uint8]:
         """Return the bytes of place and polarity [n, 2] in the device's axes."""
-        x, y = events.x.astype(np.int64), events.y.astype(np.int64)
-        if self.options.flip_x:
-            x = events.width - 1 - x
-        if self.options.flip_y:
-            y = events.height - 1 - y
-        if self.options.swap_xy:
-            x, y = y, x
+        turned = to_device(events, self.options)
+        x, y = turned.x.astype(np.int64), turned.y.astype(np.int64)
         if int(x.max()) >= SIDE_PX or int(y.max()) >= SIDE_PX:
             raise ConfigError(
                 f"an eDVS has {SIDE_PX}x{SIDE_PX} px, and an event of this {events.width}x{events.height} recording "

@@ -52,6 +52,7 @@ class FramedDecoder:
         self._waiting_ticks: list[int] = []
         self._decisions: list[tuple[int, NDArray[np.bool_]]] = []
         self._decided = 0
+        self._anew = False
 
     def feed(self, data: bytes) -> Events:
         """Take bytes; return the events of the frames that are complete."""
@@ -128,9 +129,8 @@ class FramedDecoder:
         if anew or self._event is None:
             self._event = hello.next_event
         if anew:
-            # The clock began anew: time goes on from the last event.
             self.counters.time_jumps += 1
-            self._outbox.go_on_from(hello.ticks * hello.tick_ns // 1000)
+            self._anew = True
         self._ticks = hello.ticks
 
     def _take_events(self, payload: bytes) -> bool:
@@ -151,6 +151,10 @@ class FramedDecoder:
             self._unpack()
             self.counters.time_jumps += 1
             self._outbox.go_on_from(ticks * self._tick_ns // 1000)
+        if self._anew:
+            # The clock began anew: time goes on from the last event.
+            self._outbox.go_on_from(ticks * self._tick_ns // 1000)
+            self._anew = False
         self._ticks = ticks
         self.frames += 1
         self._waiting.append(payload)

@@ -43,7 +43,13 @@ class FramedEncoder:
         self._hello_frames = 0
 
     def begin(self) -> bytes:
-        """Return a zero byte, which ends whatever was on the line, and a HELLO where the size is known."""
+        """Return a zero byte, which ends whatever was on the line, and a HELLO where the size is known.
+
+        Behind events that were encoded before it begins a new session, whose events count from 0.
+        """
+        if self._event:
+            self._session += 1
+            self._event, self._hello_us = 0, None
         return b"\0" + (self.hello(0) if all(self._size) else b"")
 
     def hello(self, t_us: int) -> bytes:
