@@ -141,7 +141,7 @@ def _relative(measure: Callable[[NDArray[np.float64]], float], images: Images) -
 
 
 def _fit(part: Events) -> tuple[float, int, float | None]:
-    """Maximise contrast from scratch: seconds, then once more under the allocator's eye for the peak of bytes."""
+    """Maximise contrast from scratch: under the allocator's eye for the peak of bytes, then, compiled, for seconds."""
     config = FitConfig(windows=1, window_us=max(part.span_us, 100))
 
     def fit() -> float | None:
@@ -151,15 +151,13 @@ def _fit(part: Events) -> tuple[float, int, float | None]:
             return None
         return found.omega_rad_s if found.confident else None
 
-    fit()  # compile
-    begin_s = time.perf_counter()
-    omega = fit()
-    seconds = time.perf_counter() - begin_s
     tracemalloc.start()
     fit()
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    return seconds, peak, omega
+    begin_s = time.perf_counter()
+    omega = fit()
+    return time.perf_counter() - begin_s, peak, omega
 
 
 def _cancel(events: Events, config: CancelConfig, schedule: MotionSchedule) -> tuple[NDArray[np.bool_], float, int]:

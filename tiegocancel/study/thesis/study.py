@@ -83,7 +83,11 @@ def run_study(
             progress=progress,
         )
         agreed = run_sweep(
-            Task(agree, bench), [point.job() for point in compared], engine, results, basis=f"agreement {basis}"
+            Task(agree, bench),
+            [] if swept.interrupted else [point.job() for point in compared],
+            engine,
+            results,
+            basis=f"agreement {basis}",
         )
     found: dict[str, Any] = {
         "bench": bench,
@@ -91,7 +95,7 @@ def run_study(
         "results": Results(
             {point: row for point, row in zip(points, swept.rows, strict=True) if row is not None}, len(bench.windows)
         ),
-        "agreement": tuple((p, row) for p, row in zip(compared, agreed.rows, strict=True) if row is not None),
+        "agreement": tuple((p, row) for p, row in zip(compared, agreed.rows, strict=False) if row is not None),
         "resumed": swept.resumed + agreed.resumed,
         "run": swept.run + agreed.run,
         "interrupted": swept.interrupted or agreed.interrupted,
