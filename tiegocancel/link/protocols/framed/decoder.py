@@ -20,6 +20,7 @@ __all__ = ["FramedDecoder"]
 _STAMP_MASK, _STAMP_HALF = (1 << 32) - 1, 1 << 31
 _FRAMES_AT_ONCE = 256
 _HEAD = struct.Struct("<HIB")
+_EVENTS = int(Kind.EVENTS)
 _MOST_DECISIONS = 4096
 
 
@@ -99,6 +100,11 @@ class FramedDecoder:
 
     def _take(self, frame: Frame, parts: list[Events]) -> bool:
         """Take a frame whose CRC is right; return whether its payload is sound."""
+        if frame.kind == _EVENTS:
+            if self._sequence is not None:
+                self.counters.lost_frames += (frame.sequence - self._sequence) & 0xFF
+            self._sequence = (frame.sequence + 1) & 0xFF
+            return self._take_events(frame.payload)
         hello = Hello.from_payload(frame.payload) if frame.kind == Kind.HELLO else None
         if frame.kind == Kind.HELLO and hello is None:
             return False
@@ -109,8 +115,6 @@ class FramedDecoder:
         if hello is not None:
             self._take_hello(hello, parts, anew=anew)
             return True
-        if frame.kind == Kind.EVENTS:
-            return self._take_events(frame.payload)
         if frame.kind == Kind.DECISIONS:
             return self._take_decisions(frame.payload)
         if frame.kind == Kind.TEXT:
@@ -192,4 +196,4 @@ class FramedDecoder:
             self.counters.lost_events += payloads[0][6]
             return
         times = columns.ticks if self._tick_ns == 1000 else columns.ticks * self._tick_ns // 1000
-        self._outbox.put(times, columns.x, columns.y, columns.p.astype(np.uint8))
+        self._outbox.put(times, columns.x, columns.y, columns.p)

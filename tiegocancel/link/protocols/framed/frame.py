@@ -45,7 +45,7 @@ def seal_frame(kind: Kind, sequence: int, payload: bytes) -> bytes:
 def seal_content(content: bytes) -> bytes:
     """Seal ``content``, which begins with the two bytes of kind and sequence number."""
     # CRC-16/IBM-3740, also known as CCITT-FALSE: polynomial 0x1021, start 0xFFFF. The standard library has it.
-    encoded: bytes = _cobs().encode(content + crc_hqx(content, 0xFFFF).to_bytes(2, "little"))
+    encoded: bytes = _cobs().encode(content + crc_hqx(content, 0xFFFF).to_bytes(2, "big"))
     return encoded + b"\0"
 
 
@@ -58,7 +58,8 @@ def open_frame(encoded: bytes) -> Frame | None:
         content = cobs.decode(encoded)
     except cobs.DecodeError:
         return None
-    if crc_hqx(content[:-2], 0xFFFF) != int.from_bytes(content[-2:], "little") or content[0] >> 4 != VERSION:
+    # With its high byte first the CRC over content and CRC is 0.
+    if crc_hqx(content, 0xFFFF) or content[0] >> 4 != VERSION or len(content) < 4:
         return None
     return Frame(content[0] & 0xF, content[1], content[2:-2])
 

@@ -19,6 +19,8 @@ _PADDING = 64
 _HEAD = np.dtype([("first", "<u2"), ("ticks", "<u4"), ("count", "u1"), ("form", "<u2")])
 _PLACE_WIDTHS = 13
 _ABSOLUTE = 15
+_LOW = (np.uint64(1) << np.arange(64, dtype=np.uint64)) - np.uint64(1)
+"""Masks of the lowest bits, by their number."""
 _Ints = NDArray[np.int64]
 
 
@@ -29,7 +31,7 @@ class Columns:
     ticks: _Ints
     x: _Ints
     y: _Ints
-    p: _Ints
+    p: NDArray[Any]
     frame: _Ints
 
 
@@ -89,46 +91,48 @@ def unpack(payloads: list[bytes], base_ticks: _Ints, width: int, height: int) ->
     size = np.array([len(payload) for payload in payloads])
     begin = np.cumsum(size) - size
     head = data[begin[:, None] + np.arange(_HEAD.itemsize)].reshape(-1).view(_HEAD)
-    count, form = head["count"].astype(np.int64), head["form"].astype(np.int64)
-    frame = np.repeat(np.arange(len(size)), count)
+    count, form = head["count"].astype(np.int64), head["form"]
     starts = np.cumsum(count) - count
-    row = np.arange(len(frame)) - starts[frame]
+    row = np.arange(int(count.sum())) - np.repeat(starts, count)
     fields = ((0, 31, 5, STEP_BITS), (6, 15, 10, bits_of(width)), (11, 15, 15, bits_of(height)))
     ahead = 8 * (begin + _HEAD.itemsize)
-    limit = 8 * (begin + size)
     longs, widths = [], []
     for shift, mask, flag, full in fields:
-        short, mixed = form >> shift & mask, form >> flag & 1
-        width, long = short[frame], ((short == _ABSOLUTE) & (mask == _ABSOLUTE))[frame]
+        short, mixed = (form >> shift & mask).astype(np.uint8), (form >> flag & 1).astype(np.uint8)
+        absolute = short == _ABSOLUTE if mask == _ABSOLUTE else np.zeros(len(short), np.bool_)
+        long = np.repeat(absolute, count)
         if mixed.any():
             # What would be read behind the frame is not used, and never behind the padding.
-            at = ahead[frame] + row
-            flag_set = data[at >> 3] >> (at & 7).astype(np.uint8) & mixed.astype(np.uint8)[frame]
-            long = long | flag_set.astype(np.bool_)
+            at = np.repeat(ahead, count) + row
+            long |= (data[at >> 3] >> (at & 7).astype(np.uint8) & np.repeat(mixed, count)).astype(np.bool_)
             ahead = ahead + mixed * count
         longs.append(long)
-        widths.append(np.where(long, full, width))
-    bits = 1 + widths[0] + widths[1] + widths[2]
-    behind = np.cumsum(bits) - bits
-    at = ahead[frame] + behind - behind[starts[frame]]
+        widths.append(np.where(long, np.uint8(full), np.repeat(short, count)))
+    bits = widths[0] + widths[1] + widths[2] + np.uint8(1)
+    behind = np.cumsum(bits, dtype=np.int64) - bits
     # Records follow each other: a frame is whole when its last one is.
-    ends = np.append(starts[1:], len(frame)) - 1
-    if ((at[ends] + bits[ends]) > limit).any() or (count == 0).any() or int(bits.max()) > 57:
+    if (count == 0).any() or int(bits.max()) > 57:
+        return None
+    at = np.repeat(ahead - behind[starts], count) + behind
+    ends = np.append(starts[1:], len(row)) - 1
+    if (at[ends] + bits[ends] > 8 * (begin + size)).any():
         return None
     # Eight bytes from any byte on: a record of up to 57 bits lies in them whole.
     eight = np.ndarray((len(data) - 7,), "<u8", data, strides=(1,))
     record = eight[at >> 3] >> (at & 7).astype(np.uint64)
-    p = (record & np.uint64(1)).astype(np.int64)
-    values: list[_Ints] = []
-    done = np.ones(len(frame), np.int64)
-    for index in (1, 2, 0):
-        low = (np.uint64(1) << widths[index].astype(np.uint64)) - np.uint64(1)
-        values.append((record >> done.astype(np.uint64) & low).astype(np.int64))
-        done += widths[index]
-    x, y = (_held(value, long, starts, frame) for value, long in zip(values[:2], longs[1:], strict=True))
-    elapsed = np.cumsum(values[2])
-    ticks = base_ticks[frame] + elapsed - (elapsed - values[2])[starts[frame]]
-    return Columns(ticks, x, y, p, frame)
+    p = (record & np.uint64(1)).astype(np.uint8)
+    record >>= np.uint64(1)
+    x, y = (
+        _held((record >> ahead_bits & _LOW[width]).astype(np.int64), long, starts)
+        for ahead_bits, width, long in (
+            (np.uint64(0), widths[1], longs[1]),
+            (widths[1].astype(np.uint64), widths[2], longs[2]),
+        )
+    )
+    steps = (record >> (widths[1] + widths[2]).astype(np.uint64) & _LOW[widths[0]]).astype(np.int64)
+    elapsed = np.cumsum(steps)
+    ticks = np.repeat(base_ticks - (elapsed - steps)[starts], count) + elapsed
+    return Columns(ticks, x, y, p, np.repeat(np.arange(len(size)), count))
 
 
 class _Column:
@@ -173,17 +177,19 @@ def _zigzag(steps: _Ints) -> _Ints:
     return steps << 1 ^ steps >> 63
 
 
-def _held(value: _Ints, long: NDArray[np.bool_], starts: _Ints, frame: _Ints) -> _Ints:
+def _held(value: _Ints, long: NDArray[np.bool_], starts: _Ints) -> _Ints:
     """Add up steps from the last whole value, or from 0 at the start of a frame."""
-    steps = np.where(long, 0, value >> 1 ^ -(value & 1))
+    if long.all():
+        return value
+    steps = value >> 1 ^ -(value & 1)
+    steps[long] = 0
     total = np.cumsum(steps)
-    anchor = np.zeros(len(value), np.int64)
-    index = np.arange(len(value))
-    anchor[starts] = starts
-    anchor[long] = index[long]
-    anchor = np.maximum.accumulate(anchor)
-    origin = np.where(long, value, steps)
-    held: _Ints = origin[anchor] + total - total[anchor]
+    # From each anchor on the sum goes on from what stands there.
+    anchored = long.copy()
+    anchored[starts] = True
+    anchors = np.flatnonzero(anchored)
+    origin = np.where(long[anchors], value[anchors], steps[anchors]) - total[anchors]
+    held: _Ints = total + np.repeat(origin, np.diff(np.append(anchors, len(value))))
     return held
 
 
