@@ -6,6 +6,8 @@ from tiegocancel.firmware_sim.export.layout import CYCLES, DECISIONS, EVENTS, SC
 from tiegocancel.firmware_sim.export.vectors import Vectors
 from tiegocancel.firmware_sim.export.words import Word
 
+from tiegocancel.motion.schedule import MotionSchedule
+
 __all__ = ["readme_text"]
 
 _TITLES = {
@@ -34,6 +36,7 @@ def readme_text(vectors: Vectors, words: dict[str, Word]) -> str:
         "An event uses the last schedule entry with t_us at or before its own, the first one before that:",
         "  x' = ((x << 16) + a*x + b*y + c + 32768) >> 16     (arithmetic shift)",
         "  y' = ((y << 16) + d*x + e*y + f + 32768) >> 16",
+        *_remark_on_unknown(vectors),
         "",
         "Counted at the end: " + ", ".join(f"{name} {count}" for name, count in dict(vectors.counters).items()) + ".",
         "",
@@ -67,6 +70,14 @@ def readme_text(vectors: Vectors, words: dict[str, Word]) -> str:
             f"{DECISIONS}. {int(vectors.cycles.dropped.sum())} events were dropped.",
         ]
     return "\n".join(lines) + "\n"
+
+
+def _remark_on_unknown(vectors: Vectors) -> list[str]:
+    """Say what an entry of an unknown motion is, where there is one: its coefficients ask for many bits."""
+    unknown = MotionSchedule.unknown().coefficients[0]
+    if not any((one.coefficients == unknown).all(axis=1).any() for one in vectors.schedules):
+        return []
+    return ["An entry with c = f = 2^44 marks a motion that is not known: it predicts beyond every sensor."]
 
 
 def _indented(word: Word) -> list[str]:

@@ -16,7 +16,7 @@ from tiegocancel.matching.selective import Schedules, schedules_for
 from tiegocancel.matching.selective_oracle import SelectiveOracle
 from tiegocancel.motion.schedule import MotionSchedule
 
-__all__ = ["CoreCycles", "Vectors", "golden_vectors", "time_base_us"]
+__all__ = ["CoreCycles", "Vectors", "golden_vectors", "last_asked_us", "time_base_us"]
 
 _PART_EVENTS = 4096
 
@@ -100,6 +100,14 @@ def time_base_us(events: Events, config: CancelConfig) -> int:
     return int(events.t[0]) >> config.tick_bits << config.tick_bits
 
 
+def last_asked_us(events: Events, config: CancelConfig) -> int:
+    """Return the last time whose motion a stretch can ask for.
+
+    Where the motion is that of a gate's opening, a gate opens at a tick, and its time lies within that tick.
+    """
+    return int(events.t[-1]) + ((1 << config.tick_bits) - 1 if config.motion_at == "gate" else 0)
+
+
 def golden_vectors(
     events: Events,
     config: CancelConfig,
@@ -133,10 +141,8 @@ def _cut(schedules: Schedules, events: Events, config: CancelConfig) -> Schedule
     """
     if not len(events):
         raise ValueError("vectors need at least one event")
-    base_us, last_us = time_base_us(events, config), int(events.t[-1])
-    if config.motion_at == "gate":
-        last_us += config.horizons_us[-1] - config.early_gate_us
-    first, last = schedules[0].entry_at(np.array([events.t[0], last_us], np.int64)).tolist()
+    base_us = time_base_us(events, config)
+    first, last = schedules[0].entry_at(np.array([events.t[0], last_asked_us(events, config)], np.int64)).tolist()
     times = np.maximum(schedules[0].t_us[first : last + 1], base_us)
     return tuple(
         MotionSchedule(times, one.coefficients[first : last + 1], horizon_us)

@@ -8,6 +8,7 @@ import numpy as np
 
 from tiegocancel.chunks import rechunk
 from tiegocancel.events import Events
+from tiegocancel.firmware_sim.export.vectors import last_asked_us
 from tiegocancel.matching.config import CancelConfig
 from tiegocancel.matching.selective import Schedules
 from tiegocancel.study.feed import MotionFeed
@@ -58,10 +59,8 @@ def take_beginning(
 
 def motion_of(feed: MotionFeed, config: CancelConfig, events: Events, *, step_us: int) -> Schedules:
     """Return the schedule of each horizon for a stretch that the feed has looked at."""
-    last_us = int(events.t[-1])
-    if config.motion_at == "gate":
-        last_us += config.horizons_us[-1] - config.early_gate_us
+    start_us, stop_us = int(events.t[0]), last_asked_us(events, config)
     return tuple(
-        feed.schedule(horizon_us, start_us=int(events.t[0]), stop_us=last_us, step_us=step_us)
+        feed.schedule(horizon_us, start_us=start_us, stop_us=stop_us, step_us=step_us)
         for horizon_us in config.horizons_us
     )

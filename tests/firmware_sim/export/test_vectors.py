@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tiegocancel.firmware_sim.export import golden_vectors
 from tiegocancel.firmware_sim.export.layout import cell_word, ring_word, state_of, vector_words
+from tiegocancel.firmware_sim.export.readme import readme_text
 
 from tiegocancel.events import Events
 from tiegocancel.matching.config import CancelConfig
@@ -32,6 +33,27 @@ def test_decisions_equal_the_plain_models_under_whole_schedules(draw: Draw, seed
     assert vectors.counters == oracle.counters
     assert (vectors.support[vectors.suppressed] >= config.need).all()
     assert len(vectors.schedules[0]) <= len(schedules[0])
+
+
+def test_a_gate_may_ask_for_an_entry_later_in_the_tick_of_the_last_event() -> None:
+    config = CancelConfig(
+        horizon_us=160, early_us=0, late_us=16, tick_bits=3, tolerance_px=0.0, motion_at="gate", ring_capacity=4
+    )
+    coefficients = np.array([[0, 0, 0, 0, 0, 0], [0, 0, 3 << 16, 0, 0, 0], [0, 0, 9 << 16, 0, 0, 0]])
+    whole = MotionSchedule(np.array([0, 165, 168]), coefficients, 160)
+    events = Events([7, 160], [1, 4], [0, 0], [1, 1], 8, 1)  # type: ignore[arg-type]
+    # The first event's gate opens at 7 + 160 µs, in the tick of the second one; by then the motion is of 3 px.
+    vectors = golden_vectors(events, config, whole)
+    assert vectors.suppressed.tolist() == [False, True]
+    assert vectors.schedules[0].t_us.tolist() == [0, 165]
+
+
+def test_an_unknown_motion_is_explained(disc: Callable[..., Any]) -> None:
+    vectors = disc(CancelConfig(horizon_us=2000, ring_capacity=500))
+    assert "2^44" not in readme_text(vectors, vector_words(vectors))
+    unknown = golden_vectors(vectors.events, vectors.config, MotionSchedule.unknown())
+    assert not unknown.suppressed.any()
+    assert "An entry with c = f = 2^44 marks a motion that is not known" in readme_text(unknown, vector_words(unknown))
 
 
 @settings(max_examples=80)

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from tiegocancel.firmware_sim.export import read_vectors
 
-from tiegocancel import read_events
+from tiegocancel import MotionSchedule, read_events
 from tiegocancel.cli import main
+from tiegocancel.motion.schedule_file import write_schedule
 from tiegocancel.study.beginning import BEYOND_WARM_UP
 
 Invoke = Callable[..., tuple[int, str, list[str]]]
@@ -20,12 +21,12 @@ SHORT = ("--horizon-us", 3000, "--tolerance-us", 500)
 
 @pytest.fixture(scope="module")
 def disc(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A small disc that turns fast for 40 ms, with its truth beside it."""
+    """A small disc that turns fast for 25 ms, with its truth beside it."""
     folder = tmp_path_factory.mktemp("export")
     (folder / "disc.toml").write_text("[scene.rig]\nomega_rad_s = 14.4\n", encoding="utf-8")
     path = folder / "disc.npz"
     sizes = ("--width", "320", "--height", "180", "--config", str(folder / "disc.toml"))
-    assert main(["simulate", str(path), "--duration", "0.04", "--seed", "2", *sizes]) == 0
+    assert main(["simulate", str(path), "--duration", "0.025", "--seed", "2", *sizes]) == 0
     return path
 
 
@@ -70,9 +71,9 @@ def test_the_stretch_is_the_warm_up_and_what_can_be_suppressed_after_it(disc: Pa
     assert out.splitlines()[-1] == "vectors: tiegocancel-vectors"
 
 
-@pytest.mark.parametrize("preset", ["plain", "dense"])
-def test_decisions_are_those_of_a_run(disc: Path, invoke: Invoke, preset: str) -> None:
-    given = (disc, *truth(disc), "--preset", preset, "--horizon-us", 10_240)
+@pytest.mark.parametrize("rule", [("plain",), ("dense", "--need", 2)])
+def test_decisions_are_those_of_a_run(disc: Path, invoke: Invoke, rule: tuple[object, ...]) -> None:
+    given = (disc, *truth(disc), "--horizon-us", 10_240, "--preset", *rule)
     code, out, _ = invoke("export", *given, "--max-events", 10**9, "--json")
     assert code == 0
     rest = ("--no-controls", "--no-figures", "--no-diagnosis", "--residual", "npz", "--out", "r")
@@ -96,7 +97,7 @@ def test_a_stretch_may_begin_later_and_begins_empty(disc: Path, invoke: Invoke) 
 
 def test_a_tracked_motion_is_that_of_the_events_up_to_there(disc: Path, invoke: Invoke) -> None:
     arguments = ("export", disc, "--motion", "track", "--window-us", 5000, "--step-us", 2000, *SHORT)
-    code, _, _ = invoke(*arguments, "--from-us", 20_000, "--max-events", 20_000, "--out", "v")
+    code, _, _ = invoke(*arguments, "--from-us", 12_000, "--max-events", 12_000, "--out", "v")
     assert code == 0
     assert read_vectors(Path("v")).suppressed.any()
 
@@ -154,8 +155,8 @@ def test_what_cannot_be_exported_is_one_line(
     given = (*truth(disc), *SHORT) if "--config" not in arguments else ()
     if not given:
         Path("two.toml").write_text("[cancel]\nhorizon_us = 3000\nmore_horizons_us = [6000]\n", encoding="utf-8")
-        schedule = ("--schedule", "s.schedule", "--horizon-us", 3000, "--no-figures", "--step-us", 5000)
-        assert invoke("motion", disc, *schedule)[0] == 0
+        turn = MotionSchedule.rotation(center_px=(160, 90), omega_rad_s=14.4, horizon_us=3000)
+        write_schedule(turn, "s.schedule")
     else:
         Path("two.toml").touch()
     told, out, err = invoke("export", disc, *given, *arguments)
