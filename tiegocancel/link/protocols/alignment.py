@@ -15,17 +15,18 @@ from tiegocancel.link.protocols.options import ProtocolOptions
 from tiegocancel.link.protocols.outbox import Outbox
 from tiegocancel.link.protocols.protocol import LinkCounters, TextLine
 
-__all__ = ["LONGEST_TEXT", "PRINTABLE", "TEXT", "AlignedDecoder", "Kind", "Piece"]
+__all__ = ["AlignedDecoder", "Kind", "Piece"]
 
 _FEWEST_ROWS, _ROWS_BEHIND_TEXT, _MOST_ROWS = 16, 1024, 1 << 14
-_JUNK_BITS, _LONG_JUNK_BITS, _BREACH_BITS, _AFTER_ROW_BITS, _TEXT_BITS = 10.0, 4.0, 16.0, 4.0, 5.0
-"""What a byte costs that belongs to nothing, what a breach costs, and that it seldom begins just behind a good row;
-a character of text."""
-
-
-LONGEST_TEXT = 200
-PRINTABLE = re.compile(rb"[\t\r\x20-\x7e]{0,201}")
-TEXT = re.compile(rb"[\t\r\x20-\x7e]{0,200}\n")
+_JUNK_BITS, _LONG_JUNK_BITS = 10.0, 4.0
+"""What a byte costs that belongs to nothing, and how much more beyond the length of a row."""
+_BREACH_BITS, _AFTER_ROW_BITS = 16.0, 4.0
+"""What it costs that such bytes begin, and how much more just behind a row that seemed good."""
+_TEXT_BITS = 5.0
+"""What a character of text costs."""
+_LONGEST_TEXT = 200
+_PRINTABLE = re.compile(rb"[\t\r\x20-\x7e]{0,201}")
+_TEXT = re.compile(rb"[\t\r\x20-\x7e]{0,200}\n")
 
 Kind = Literal["row", "text", "junk"]
 
@@ -105,16 +106,16 @@ class AlignedDecoder(ABC):
 
     def _rest_of_text(self, data: bytes, place: int) -> tuple[Kind, int]:
         """Find the end of text that was cut; nothing yet where it may still come, junk where it is none."""
-        if line := TEXT.match(data, place):
+        if line := _TEXT.match(data, place):
             return "text", len(line[0])
-        length = len(PRINTABLE.match(data, place)[0])  # type: ignore[index]
-        if place + length == len(data) and length <= LONGEST_TEXT:
+        length = _printable_bytes(data, place)
+        if place + length == len(data) and length <= _LONGEST_TEXT:
             return "text", 0
         return "junk", max(length, 1)
 
     def _text_piece(self, data: bytes, place: int, state: Any) -> list[Piece]:
         """Return the text at ``place``, up to its end or that of ``data``; none where there is none."""
-        length = len(PRINTABLE.match(data, place)[0])  # type: ignore[index]
+        length = _printable_bytes(data, place)
         if data[place + length : place + length + 1] == b"\n":
             length += 1
         elif not length or place + length < len(data):
@@ -123,8 +124,8 @@ class AlignedDecoder(ABC):
 
     def _text_waits(self, data: bytes, place: int) -> bool:
         """Tell whether all from ``place`` on may be text whose end is to come."""
-        length = len(PRINTABLE.match(data, place)[0])  # type: ignore[index]
-        return 0 < length <= LONGEST_TEXT and place + length == len(data)
+        length = _printable_bytes(data, place)
+        return 0 < length <= _LONGEST_TEXT and place + length == len(data)
 
     def _plainly(self, data: bytes, place: int) -> tuple[Kind, int] | None:
         """Return what stands at ``place`` where that needs no search: whole text, or a good row before it."""
@@ -252,7 +253,8 @@ class AlignedDecoder(ABC):
         behind: list[list[_Path]] = [[] for _ in range(span + 1)]
         within: list[list[_Path]] = [[] for _ in range(span + 1)]
         behind[0].append((0.0, self._state(), None))
-        best_bits, best = math.inf, ("junk", 1)
+        best_bits = math.inf
+        best: tuple[Kind, int] = ("junk", 1)
         for at in range(span + 1):
             left = least * (span - at)
             for paths in (behind[at], within[at]):
@@ -276,7 +278,7 @@ class AlignedDecoder(ABC):
                     if paths is behind[at]:
                         junk += _BREACH_BITS + (_AFTER_ROW_BITS if at else 0.0)
                     _offer(within[at + 1], (bits + junk, state, first))
-        return best  # type: ignore[return-value]
+        return best
 
     @abstractmethod
     def _least_bits(self) -> float:
@@ -298,3 +300,9 @@ def _offer(paths: list[_Path], path: _Path) -> None:
 
 def _bits(path: _Path) -> float:
     return path[0]
+
+
+def _printable_bytes(data: bytes, place: int) -> int:
+    """Return how many characters of text follow from ``place`` on, 201 at most."""
+    found = _PRINTABLE.match(data, place)
+    return found.end() - place if found else 0

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import shutil
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -79,6 +81,37 @@ def test_one_vector_is_read_by_hand_from_the_page() -> None:
     x = field(3) if wx == 15 else field(wx) >> 1
     y = field(2) if wy == 15 else field(wy) >> 1
     assert (p, x, y, int.from_bytes(content[4:8], "little")) == (1, 3, 2, 5)
+
+
+@pytest.fixture(scope="module")
+def reader_in_c(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A reader written from the page alone, in C."""
+    compiler = shutil.which("cc")
+    if compiler is None:
+        pytest.skip("no C compiler")
+    program = tmp_path_factory.mktemp("c") / "framed_reader"
+    source = Path(__file__).with_name("framed_reader.c")
+    subprocess.run([compiler, "-O1", "-Wall", "-Wextra", "-Werror", "-o", str(program), str(source)], check=True)
+    return program
+
+
+def read_in_c(program: Path, line: bytes) -> list[tuple[int, ...]]:
+    done = subprocess.run([str(program)], input=line, capture_output=True, check=True)
+    return [tuple(map(int, row.split())) for row in done.stdout.splitlines()]
+
+
+@pytest.mark.parametrize(
+    "case", [case for case in COMMITTED["streams"] if "t_us" in case], ids=lambda case: case["name"]
+)
+def test_a_reader_in_c_finds_the_same_in_every_vector(case: dict[str, Any], reader_in_c: Path) -> None:
+    found = read_in_c(reader_in_c, bytes.fromhex(case["line"]))
+    assert found == list(zip(case["t_us"], case["x"], case["y"], case["on"], strict=True))
+
+
+@pytest.mark.parametrize(("side_px", "step_us"), [(128, 160), (1280, 1), (320, 20_000)])
+def test_a_reader_in_c_finds_the_events_of_any_stream(side_px: int, step_us: int, reader_in_c: Path) -> None:
+    events = stream(8, 5000, side_px=side_px, step_us=step_us)
+    assert read_in_c(reader_in_c, encoded("framed", ProtocolOptions(), events)) == rows(events)
 
 
 @given(
