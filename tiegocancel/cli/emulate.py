@@ -53,13 +53,18 @@ def run(args: argparse.Namespace) -> int:
         return _cancel(args)
     if args.source is None:
         raise ConfigError("FILE is missing: the recording that the device plays")
-    with reader_from(args, args.source) as reader, PseudoTerminal(symlink=args.symlink) as line:
-        port = line.port if args.symlink is None else f"{args.symlink} ({line.port})"
-        sys.stderr.write(f"{args.protocol} device with {args.source.name} at {port}; Ctrl-C ends it\n")
-        if not args.json:
-            sys.stdout.write(f"{line.port}\n")
-            sys.stdout.flush()
-        code = serve(args, reader, line, at_once=args.at_once, once=args.once)
+    with reader_from(args, args.source) as reader, PseudoTerminal() as line:
+
+        def ready() -> None:
+            if args.symlink is not None:
+                line.name(args.symlink)
+            port = line.port if args.symlink is None else f"{args.symlink} ({line.port})"
+            sys.stderr.write(f"{args.protocol} device with {args.source.name} at {port}; Ctrl-C ends it\n")
+            if not args.json:
+                sys.stdout.write(f"{line.port}\n")
+                sys.stdout.flush()
+
+        code = serve(args, reader, line, at_once=args.at_once, once=args.once, ready=ready)
         deadline_s = time.monotonic() + _LAST_BYTES_S
         while args.once and not code and line.unread and time.monotonic() < deadline_s:
             time.sleep(0.01)
@@ -83,7 +88,9 @@ def _cancel(args: argparse.Namespace) -> int:
         raise ConfigError("--canceller: say the sensor with --width and --height")
     fresh = fresh_canceller(args, width=args.width, height=args.height)
     device = DeciderDevice(ProtocolOptions(width=args.width, height=args.height), fresh)
-    with PseudoTerminal(symlink=args.symlink) as line, deferred_interrupt() as interrupt:
+    with PseudoTerminal() as line, deferred_interrupt() as interrupt:
+        if args.symlink is not None:
+            line.name(args.symlink)
         sys.stderr.write(f"device that cancels at {args.symlink or line.port}; Ctrl-C ends it\n")
         sys.stdout.write(f"{line.port}\n")
         sys.stdout.flush()

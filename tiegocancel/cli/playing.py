@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -45,8 +45,19 @@ def pace_from(args: argparse.Namespace) -> Pace:
     return Pace(speed=args.speed, bytes_per_s=rate, when_full=args.when_full)
 
 
-def serve(args: argparse.Namespace, reader: EventReader, line: DeviceLine, *, at_once: bool, once: bool) -> int:
-    """Serve the line with the recording until Ctrl-C, or with ``once`` until it was played; print what was done."""
+def serve(
+    args: argparse.Namespace,
+    reader: EventReader,
+    line: DeviceLine,
+    *,
+    at_once: bool,
+    once: bool,
+    ready: Callable[[], None] = lambda: None,
+) -> int:
+    """Serve the line with the recording until Ctrl-C, or with ``once`` until it was played; print what was done.
+
+    ``ready`` is called when the device is about to answer.
+    """
     from tiegocancel.interrupt import deferred_interrupt
     from tiegocancel.link.emulator import Emulator, repeated
     from tiegocancel.link.protocols import registry
@@ -71,6 +82,7 @@ def serve(args: argparse.Namespace, reader: EventReader, line: DeviceLine, *, at
             at_once=at_once,
             once=once,
         )
+        ready()
         emulator.serve()
     for played in emulator.plays:
         seconds = max(played.seconds, 1e-9)

@@ -19,13 +19,13 @@ class PseudoTerminal:
     """A pair of which this end is a :class:`~tiegocancel.link.protocols.protocol.Line` and ``port`` names the other.
 
     The other end is kept open here too, so that a host may come and go: bytes that nobody reads fill the system's
-    buffer, and then writing waits, at most ``write_timeout_s``. ``symlink`` gives the port a second name. POSIX only.
+    buffer, and then writing waits, at most ``write_timeout_s``. POSIX only.
     """
 
     ended = False
     answers = True
 
-    def __init__(self, *, symlink: Path | None = None, write_timeout_s: float = 5.0) -> None:
+    def __init__(self, *, write_timeout_s: float = 5.0) -> None:
         try:
             import tty
         except ImportError:
@@ -38,9 +38,6 @@ class PseudoTerminal:
             tty.setraw(self._host)
             os.set_blocking(self._device, False)
             self.port = os.ttyname(self._host)
-            if symlink is not None:
-                _link(symlink, self.port)
-                self._symlink = symlink
         except BaseException:
             self.close()
             raise
@@ -52,6 +49,11 @@ class PseudoTerminal:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+    def name(self, symlink: Path) -> None:
+        """Give the port a second name, until it is closed; raise :class:`ConfigError` where a file is in the way."""
+        _link(symlink, self.port)
+        self._symlink = symlink
 
     def read(self, most: int, timeout_s: float) -> bytes:
         """Return what the host sent, as soon as there is any, nothing after ``timeout_s``."""
@@ -87,9 +89,10 @@ class PseudoTerminal:
             if descriptor >= 0:
                 with contextlib.suppress(OSError):
                     os.close(descriptor)
-        if self._symlink is not None and self._symlink.is_symlink():
+        # Another device may have taken the name over.
+        if self._symlink is not None and self._symlink.is_symlink() and os.readlink(self._symlink) == self.port:
             self._symlink.unlink()
-            self._symlink = None
+        self._symlink = None
 
 
 def _link(symlink: Path, port: str) -> None:

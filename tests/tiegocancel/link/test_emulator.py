@@ -125,14 +125,15 @@ def test_a_recording_is_played_into_a_file(tiny: SimpleNamespace, tmp_path: Path
 
 def test_a_port_may_have_a_second_name(tmp_path: Path, line_options: LineOptions) -> None:
     name = tmp_path / "dvs0"
-    with PseudoTerminal(symlink=name) as line:
+    with PseudoTerminal() as line, PseudoTerminal() as other:
+        line.name(name)
         assert str(name.resolve()) == line.port
-        with PseudoTerminal(symlink=name) as other:
-            assert str(name.resolve()) == other.port
-    assert not name.exists()
+        other.name(name)
+        assert str(name.resolve()) == other.port
+    assert not name.is_symlink()
     name.write_text("a file")
-    with pytest.raises(ConfigError, match="in the way"):
-        PseudoTerminal(symlink=name)
+    with PseudoTerminal() as line, pytest.raises(ConfigError, match="in the way"):
+        line.name(name)
     assert name.read_text() == "a file"
 
 
