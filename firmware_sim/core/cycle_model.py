@@ -37,15 +37,14 @@ from tiegocancel.firmware_sim.core.function import (
     decide,
     op_room,
 )
+from tiegocancel.firmware_sim.core.plan import SCRUB, Plan
 from tiegocancel.firmware_sim.core.rule import Rule, State
-from tiegocancel.firmware_sim.core.timing import Plan
 
 from tiegocancel.events import Events
 
 __all__ = ["CycleModel", "Handled"]
 
-_NAMES = {PASS: "pass", WRITE: "write", MATCH: "match", 3: "scrub"}
-_SCRUB = 3
+_NAMES = {PASS: "pass", WRITE: "write", MATCH: "match", SCRUB: "scrub"}
 
 
 @dataclass(slots=True)
@@ -148,9 +147,9 @@ class CycleModel:
             return "-"
         if plan.scrub_cycles and (self._scrubs + 1) * plan.scrub_cycles <= self.cycle:
             self._scrubs += 1
-            self._stages.append(_Op(_SCRUB, issued=self.cycle))
+            self._stages.append(_Op(SCRUB, issued=self.cycle))
             self._issue_from = self.cycle + 1
-            return _NAMES[_SCRUB]
+            return _NAMES[SCRUB]
         if not self._predicted or self._predicted[0].taken + plan.predict_depth > self.cycle:
             return "-"
         event = self._predicted[0]
@@ -202,8 +201,8 @@ class CycleModel:
         if self.plan.interlocked and any(self._clash(op, other) for other in self._under_way):
             return "clash"
         self._stages.popleft()
-        slots = {MATCH: self.plan.match_slots, WRITE: self.plan.pass_slots, _SCRUB: self.plan.scrub_slots}[op.kind]
-        if self.plan.cached and op.kind != _SCRUB:
+        slots = {MATCH: self.plan.match_slots, WRITE: self.plan.pass_slots, SCRUB: self.plan.scrub_slots}[op.kind]
+        if self.plan.cached and op.kind != SCRUB:
             slots = self._cache(op)
         op.commit = self.cycle + slots - 1 + self.plan.tail
         for lane in lanes:
@@ -215,7 +214,7 @@ class CycleModel:
 
     def _lanes(self, op: _Op) -> range:
         """Return the lanes that an operation touches: a span."""
-        if op.kind == _SCRUB:
+        if op.kind == SCRUB:
             return range(self.plan.lanes)
         touched = []
         for column in range(op.left, op.right + 1):
@@ -228,9 +227,9 @@ class CycleModel:
 
     def _clash(self, op: _Op, other: _Op) -> bool:
         """Tell whether an operation under way may write what another one reads: the same bin, or the same set."""
-        if not (other.writes or other.kind == _SCRUB):
+        if not (other.writes or other.kind == SCRUB):
             return False
-        if _SCRUB in (op.kind, other.kind):
+        if SCRUB in (op.kind, other.kind):
             return True
         columns = 1 << self.rule.set_columns if self.rule.ways else 1 << 40
         rows = 1 << self.rule.set_rows if self.rule.ways else 1 << 40

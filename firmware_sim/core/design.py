@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from tiegocancel.firmware_sim.core.config import CoreConfig, window_shape
-from tiegocancel.firmware_sim.core.timing import fastest_scrub
+from tiegocancel.firmware_sim.core.plan import fastest_scrub
 from tiegocancel.firmware_sim.logic import LogicShape
 from tiegocancel.firmware_sim.memory_map import LogicalMemory
 from tiegocancel.firmware_sim.state import StateBits, state_bits

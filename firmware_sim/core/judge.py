@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from tiegocancel.firmware_sim.constraint import Constraint
 from tiegocancel.firmware_sim.core.design import CoreDesign
+from tiegocancel.firmware_sim.core.plan import fastest_scrub
 from tiegocancel.firmware_sim.core.simulator import CoreSimulator
-from tiegocancel.firmware_sim.core.timing import fastest_scrub
 from tiegocancel.firmware_sim.energy import estimate_energy
 from tiegocancel.firmware_sim.logic import LogicEstimate, estimate_logic
 from tiegocancel.firmware_sim.memory_map import MemoryMap, map_memories

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from tiegocancel.firmware_sim.core.function import decide, rings_held
+from tiegocancel.firmware_sim.core.plan import Clock, Plan
 from tiegocancel.firmware_sim.core.rule import Rule, State
-from tiegocancel.firmware_sim.core.timing import Clock, Plan, drops, issue_event, take
+from tiegocancel.firmware_sim.core.timing import drops, issue_event, take
 from tiegocancel.firmware_sim.jit import jit
 
 __all__ = ["DROPPED", "RESIDUAL", "SUPPRESSED", "run_chunk"]

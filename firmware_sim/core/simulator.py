@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from tiegocancel.firmware_sim.core.config import CoreConfig
 from tiegocancel.firmware_sim.core.function import OP_FIELDS, op_room
 from tiegocancel.firmware_sim.core.loop import DROPPED, SUPPRESSED, run_chunk
+from tiegocancel.firmware_sim.core.plan import CAUSES, WORK, lay_out_clock, lay_out_plan
 from tiegocancel.firmware_sim.core.rule import COUNTS, lay_out_rule, lay_out_state
-from tiegocancel.firmware_sim.core.timing import CAUSES, WORK, lay_out_clock, lay_out_plan
 
 from tiegocancel.events import Events
 from tiegocancel.matching.config import CancelConfig

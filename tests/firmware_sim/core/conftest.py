@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from tiegocancel.firmware_sim.core.config import CoreConfig
-from tiegocancel.firmware_sim.core.timing import fastest_scrub
+from tiegocancel.firmware_sim.core.plan import fastest_scrub
 
 from tiegocancel.events import Events
 from tiegocancel.matching.config import CancelConfig

@@ -85,7 +85,7 @@ def proposals(subject: Subject, target: Target, verdict: Verdict) -> Iterator[Ch
         yield from _smaller(subject, verdict.outcome)
         if isinstance(target, FpgaTarget):
             bits = subject.narrowest_stamp_bits(verdict.clock_hz)
-            yield Change(f"stamps of {bits} bits", partial(_stamped, bits=bits))
+            yield Change(f"stamps of {bits} bits", _narrow_stamps)
     if "multipliers" in failing:
         yield Change("coefficients of 14 fraction bits", _narrow)
         for count in (2, 1):
@@ -155,9 +155,9 @@ def _finer(subject: Subject, bits: int) -> Subject | None:
     return _with(subject, tick_bits=subject.cancel.tick_bits - bits)
 
 
-def _stamped(subject: Subject, bits: int) -> Subject:
+def _narrow_stamps(subject: Subject) -> Subject:
     """Narrow the stamps; the sweep goes round more often."""
-    return replace(subject, time_bits=bits)
+    return replace(subject, narrow_stamps=True)
 
 
 def _middle(subject: Subject) -> Subject:

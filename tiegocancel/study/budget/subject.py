@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from tiegocancel.firmware_sim.arrival import InputPath
 from tiegocancel.firmware_sim.core.config import CoreConfig
@@ -30,7 +30,7 @@ class Subject:
     offer: Offer
     clock_hz: float
     fixed: bool
-    time_bits: int = 0
+    narrow_stamps: bool = False
     external: ExternalMemory | None = None
 
     def narrowest_stamp_bits(self, clock_hz: float) -> int:
@@ -68,7 +68,8 @@ class Subject:
 
     def _design(self, clock_hz: float) -> CoreDesign:
         events = self.ground.events
-        return CoreDesign(self.core, self.cancel, events.width, events.height, clock_hz, self.time_bits, self.external)
+        design = CoreDesign(self.core, self.cancel, events.width, events.height, clock_hz, external=self.external)
+        return replace(design, time_bits=design.narrowest_stamp_bits) if self.narrow_stamps else design
 
 
 def offer_of(settings: BudgetSettings, target: Target) -> Offer:
