@@ -26,11 +26,14 @@ _BUS_BYTES = 8
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class MemoryCost:
-    """Wait cycles an item, int64[items]; which arrays the cache serves (1 table, 2 ring, 4 input, 8 output)."""
+    """Wait cycles an item, int64[items]; which arrays the cache serves (1 table, 2 ring, 4 input, 8 output).
+
+    ``miss_cycles`` int64[4]: of a line of each of them.
+    """
 
     wait: NDArray[np.int64]
     cached: int
-    miss_cycles: int
+    miss_cycles: NDArray[np.int64]
 
 
 def arrays_of(cancel: CancelConfig, config: McuConfig, words: WordLayout) -> list[RamArray]:
@@ -67,7 +70,7 @@ def memory_cost(target: McuTarget, words: WordLayout, ram: RamMap) -> MemoryCost
         "output": {"output": 2},
     }  # fmt: skip
     wait = np.zeros(len(ITEMS), np.int64)
-    cached, penalty = 0, 0
+    cached, penalty = 0, np.zeros(len(accesses), np.int64)
     for bit, (name, table) in enumerate(accesses.items()):
         place = ram.of(name)
         cycles = place.wait_cycles if place.fits else slowest
@@ -75,7 +78,7 @@ def memory_cost(target: McuTarget, words: WordLayout, ram: RamMap) -> MemoryCost
             continue
         if cache is not None and place.cached:
             cached |= 1 << bit
-            penalty = max(penalty, cycles + cache.line_bytes // _BUS_BYTES - 1)
+            penalty[bit] = cycles + cache.line_bytes // _BUS_BYTES - 1
             continue
         for item, count in table.items():
             wait[ITEMS.index(item)] += count * cycles

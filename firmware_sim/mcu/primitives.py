@@ -33,9 +33,9 @@ PRIMITIVES = (
 )  # fmt: skip
 """Stretches of the loop's code; a name that begins with an item's adds to it under an option.
 
-``_horizon``: for each horizon; ``_spread``, ``_line``, ``_gates`` (of OFF), ``_carry``, ``_bin``, ``_uses`` (above 1),
-``_choose``, ``_least``: under that option; ``_set``: with sets of ways instead of a cell for every bin; ``_map``: where
-the place is computed when the entry is passed; ``_wide``: with words or coefficients of 64 bits.
+``_horizon``: for each horizon beyond the first; ``_spread``, ``_line``, ``_gates`` (of OFF), ``_carry``, ``_bin``,
+``_uses`` (above 1), ``_choose``, ``_least``: under that option; ``_set``: with sets of ways instead of a cell for every
+bin; ``_map``: where the place is computed when the entry is passed; ``_wide``: with words or coefficients of 64 bits.
 """
 
 
@@ -48,7 +48,7 @@ def primitives_of_items(config: CancelConfig, words: WordLayout) -> NDArray[np.f
     table: dict[str, dict[str, float]] = {
         "event": {
             "event": 1,
-            "event_horizon": len(config.horizons_us),
+            "event_horizon": len(config.horizons_us) - 1,
             "event_spread": config.spreads,
             "event_line": config.lines,
             "event_carry": carries,

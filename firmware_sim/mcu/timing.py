@@ -13,7 +13,7 @@ M3 **Sweep.** Every ``sweep_cycles`` a block of cells wants to be looked at, in 
    goes first.
 M4 **Decision.** From ``S`` it takes the cycles of its work: for each item of :data:`~.primitives.ITEMS` those of its
    instructions (with wait states of code in flash) and of the wait states of uncached arrays, then for each line that
-   misses the data cache ``miss_cycles``; in all rounded up. ``D = S + cycles``.
+   misses the data cache ``miss_cycles`` of its array; in all rounded up. ``D = S + cycles``.
 M5 **Interrupts.** An interrupt runs before the decision of its event, ``interrupt_cycles`` as part of M4: of every
    event, of every first event of a half buffer, or none where a second core serves them.
 M6 **Output.** A residual goes to the output buffer at ``P ≥ D``, when it holds fewer than ``output_depth`` at the start
@@ -77,7 +77,7 @@ class Plan(NamedTuple):
     line_bytes: int
     cache_sets: int
     cache_ways: int
-    miss_cycles: int
+    miss_cycles: Int64s  # [4] for a line of table, ring, input, output
     table_base: int
     cell_bytes: int
     ring_base: int
@@ -161,29 +161,29 @@ def _touch_cells(rule: Rule, plan: Plan, clock: Clock, ops: NDArray[np.int64], o
 def _misses(
     rule: Rule, state: State, plan: Plan, clock: Clock, ops: NDArray[np.int64], count: int, slot: int, suppressed: int
 ) -> Any:
-    """Return how many lines an event misses."""
-    missed = 0
+    """Return the cycles that lines cost which an event misses."""
+    missed, each = 0, plan.miss_cycles
     if plan.cached & 1:
         for op in range(count):
             if ops[op, KIND] != PASS:
-                missed += _touch_cells(rule, plan, clock, ops, op)
+                missed += _touch_cells(rule, plan, clock, ops, op) * each[0]
     if plan.cached & 2:
         for h in range(len(rule.horizon)):
             ring = h if rule.chooses else 0
             for number in range(clock.passed[h], state.passed[h]):
                 at = state.ring_base[ring] + number % state.ring_room[ring]
                 first = plan.ring_base + at * plan.entry_bytes
-                missed += _touch(plan, clock, first, first + plan.entry_bytes - 1)
+                missed += _touch(plan, clock, first, first + plan.entry_bytes - 1) * each[1]
             clock.passed[h] = state.passed[h]
         if slot >= 0:
             first = plan.ring_base + slot * plan.entry_bytes
-            missed += _touch(plan, clock, first, first + plan.entry_bytes - 1)
+            missed += _touch(plan, clock, first, first + plan.entry_bytes - 1) * each[1]
     fresh = max(plan.line_bytes // 8, 1)
     if plan.cached & 4 and clock.now[_INPUTS] % fresh == 0:
-        missed += 1
+        missed += each[2]
         clock.now[MISSES] += 1
     if plan.cached & 8 and not suppressed and clock.now[_RESIDUALS] % fresh == 0:
-        missed += 1
+        missed += each[3]
         clock.now[MISSES] += 1
     return missed
 
@@ -319,7 +319,7 @@ def run_chunk(
         compute = max((cost + 65535) >> 16, 1)
         missing = 0
         if plan.cached:
-            missing = _misses(rule, state, plan, clock, ops, count, slot, suppressed) * plan.miss_cycles
+            missing = _misses(rule, state, plan, clock, ops, count, slot, suppressed)
         serve = 0
         if plan.interrupt_every and now[_INPUTS] % plan.interrupt_every == 0:
             serve = plan.interrupt_cycles

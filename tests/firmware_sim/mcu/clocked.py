@@ -180,7 +180,7 @@ class ClockedFirmware:
         compute_q16 = sum(amount * int(cost) for amount, cost in zip(amounts, plan.cost, strict=True))
         cycles = max(-(-compute_q16 // 65536), 1)
         cycles += sum(amount * int(wait) for amount, wait in zip(amounts, plan.wait, strict=True))
-        cycles += plan.miss_cycles * self._misses(count, slot, event)
+        cycles += self._misses(count, slot, event)
         if plan.interrupt_every and self._taken % plan.interrupt_every == 0:
             cycles += plan.interrupt_cycles
         self._taken += 1
@@ -191,8 +191,9 @@ class ClockedFirmware:
         return self.state.ring_base.tolist(), self.state.ring_room.tolist()
 
     def _misses(self, count: int, slot: int, event: Event) -> int:
-        """Return how many lines the event misses."""
+        """Return the cycles of the lines that the event misses."""
         plan, rule, missed = self.plan, self.rule, 0
+        per_table, per_ring, per_input, per_output = plan.miss_cycles.tolist()
         if plan.cached & 1:
             for op in self._ops[:count].tolist():
                 if op[KIND] == PASS:
@@ -201,25 +202,27 @@ class ClockedFirmware:
                     columns = range(op[LEFT], op[RIGHT] + 1)
                     if not rule.ways:
                         cells = [row * rule.bins_x + columns[0], row * rule.bins_x + columns[-1]]
-                        missed += self._touch(plan.table_base, plan.cell_bytes, cells[0], cells[1])
+                        missed += per_table * self._touch(plan.table_base, plan.cell_bytes, cells[0], cells[1])
                         continue
                     for column in columns:
                         low = (row % (1 << rule.set_rows)) * (1 << rule.set_columns)
                         first = (low + column % (1 << rule.set_columns)) * rule.ways
-                        missed += self._touch(plan.table_base, plan.cell_bytes, first, first + rule.ways - 1)
+                        missed += per_table * self._touch(
+                            plan.table_base, plan.cell_bytes, first, first + rule.ways - 1
+                        )
         if plan.cached & 2:
             bases, rooms = self._rings()
             for h in range(len(self._passed)):
                 ring = h if rule.chooses else 0
                 for number in range(self._passed[h], int(self.state.passed[h])):
                     at = bases[ring] + number % rooms[ring]
-                    missed += self._touch(plan.ring_base, plan.entry_bytes, at, at)
+                    missed += per_ring * self._touch(plan.ring_base, plan.entry_bytes, at, at)
                 self._passed[h] = int(self.state.passed[h])
             if slot >= 0:
-                missed += self._touch(plan.ring_base, plan.entry_bytes, slot, slot)
+                missed += per_ring * self._touch(plan.ring_base, plan.entry_bytes, slot, slot)
         fresh = max(plan.line_bytes // 8, 1)
-        missed += bool(plan.cached & 4) and self._taken % fresh == 0
-        missed += bool(plan.cached & 8) and not event.suppressed and self._residuals % fresh == 0
+        missed += per_input * (bool(plan.cached & 4) and self._taken % fresh == 0)
+        missed += per_output * (bool(plan.cached & 8) and not event.suppressed and self._residuals % fresh == 0)
         return missed
 
     def _touch(self, base: int, size: int, first: int, last: int) -> int:

@@ -197,7 +197,9 @@ def test_wait_states_and_misses_add_what_the_accesses_cost(draw_slow: Callable[[
         work, items = firmware.work, firmware.items
         if cached:
             assert work["wait_states"] == 0
-            assert work["cache_misses"] == firmware.cache["misses"] * firmware.plan.miss_cycles > 0
+            each = firmware.plan.miss_cycles
+            misses = firmware.cache["misses"]
+            assert 0 < each.min() * misses <= work["cache_misses"] <= each.max() * misses
             assert firmware.cache["hits"] > 0
             continue
         waits = {place.array.name: place.wait_cycles for place in firmware.ram.placements}
@@ -222,7 +224,9 @@ def test_a_cache_that_holds_everything_misses_each_line_once() -> None:
         height=48,
         saturated=True,
     )
-    firmware.plan = firmware.plan._replace(cached=3, miss_cycles=11, line_bytes=32, cache_sets=256, cache_ways=4)
+    firmware.plan = firmware.plan._replace(
+        cached=3, miss_cycles=np.full(4, 11), line_bytes=32, cache_sets=256, cache_ways=4
+    )
     firmware.clock = lay_out_clock(firmware.plan, 1)
     firmware.process(events)
     lines = 64 * 48 * firmware.plan.cell_bytes // 32 + 500 * firmware.plan.entry_bytes // 32 + 2
