@@ -53,6 +53,7 @@ def test_the_two_commands_stand_in_the_readme(readme: str) -> None:
 def test_every_command_of_the_readme_runs(readme: str, folder: Path) -> None:
     ran = commands(readme)
     verbs = {
+        "budget",
         "convert",
         "demo",
         "emulate",
