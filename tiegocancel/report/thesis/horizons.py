@@ -21,7 +21,7 @@ _THESIS = ((0.0, 1.0), (1.0, 0.90), (2.0, 0.90), (6.0, 0.35), (10.0, 0.225), (20
 
 def horizons(result: ThesisResult) -> Figure:
     """Draw the thesis's protocol on the left, the same gates with what comes before the window on the right."""
-    drawn = style.figure(11.0, 5.2)
+    drawn = style.figure(11.0, 5.0)
     left, right = drawn.subplots(1, 2, sharey=True)
     length_us = result.bench.windows[0].stop_us - result.bench.windows[0].start_us
     for name in ("printed", "printed_off", "cut"):
@@ -51,8 +51,10 @@ def horizons(result: ThesisResult) -> Figure:
         panel.set_xlabel("prediction horizon Δt (ms)")
         panel.set_xticks(range(0, 21, 5))
         percent_axis(panel)
-        panel.legend(fontsize=7, loc="upper left", bbox_to_anchor=(0.0, -0.13), ncols=2)
     left.set_ylabel("events suppressed (mean ± sd over windows)")
+    found = dict(zip(*reversed(left.get_legend_handles_labels()), strict=True))
+    found |= dict(zip(*reversed(right.get_legend_handles_labels()), strict=True))
+    drawn.legend(list(found.values()), list(found), loc="outside lower center", ncols=4, fontsize=7)
     return drawn
 
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
+import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
+from typing import Any
 
 from tiegocancel.errors import TiegoCancelError
 from tiegocancel.study.sweep.engine import Batch, Task
@@ -79,10 +81,19 @@ class Processes:
 
 
 def _install(task: Task) -> None:
-    """Keep the task in a new worker, which shares the machine with others."""
+    """Keep the task in a new worker, which shares the machine with others and ends with its sweep."""
     global _installed
+    # A worker of a sweep that was killed would wait for its next batch for ever.
+    threading.Thread(target=_end_with, args=(parent_process(),), daemon=True).start()
     os.environ.setdefault("TIEGOCANCEL_THREADS", "1")
     _installed = task
+
+
+def _end_with(parent: Any) -> None:
+    """End this process when the one that started it does."""
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 def _run_installed(batch: Batch) -> list[Row]:

@@ -21,6 +21,7 @@ from tiegocancel.study.thesis.study import ThesisResult
 __all__ = ["summarise"]
 
 _CLOSE = 0.10
+_HALF_LIFE_MS = 3.5
 
 
 def summarise(result: ThesisResult) -> list[Finding]:
@@ -150,6 +151,9 @@ def _half_life(result: ThesisResult) -> Finding:
         )
     else:
         verdict = f"With events before the window the half-life is {true.half_ms:.1f} ms"
+    still = fits["zero"]
+    if still is not None and abs(still.half_ms - _HALF_LIFE_MS) <= 0.15 * _HALF_LIFE_MS:
+        verdict += f"; a half-life of {still.half_ms:.1f} ms is what zero motion has"
     return Finding("§7.1, §7.9", "half-life τ½ of CR(Δt)", "3.5 ms", ours, verdict + ".")
 
 

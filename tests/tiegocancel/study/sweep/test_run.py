@@ -123,6 +123,27 @@ def test_a_killed_sweep_goes_on_where_it_was(tmp_path: Path, chores: ModuleType)
     assert 20 <= len(log.read_text().split()) <= 24
 
 
+def test_the_workers_of_a_killed_sweep_end(tmp_path: Path, chores: ModuleType) -> None:
+    program = (
+        "import sys; sys.path.insert(0, sys.argv[1]); import chores; from pathlib import Path\n"
+        "from tiegocancel.study.sweep import *\n"
+        "if __name__ == '__main__':\n"
+        "    jobs = [{'n': n} for n in range(2000)]\n"
+        "    store = ResultStore(Path(sys.argv[2]))\n"
+        "    run_sweep(Task(chores.slow_square, None), jobs, Processes(2), store)\n"
+    )
+    script, results = tmp_path / "sweep.py", tmp_path / "r.jsonl"
+    script.write_text(program, encoding="utf-8")
+    process = subprocess.Popen([sys.executable, str(script), str(HERE), str(results)])
+    _wait_until(lambda: results.exists() and results.read_bytes().count(b"\n") >= 6)
+    process.kill()
+    process.wait()
+    with ResultStore(results) as store:
+        workers = {row["worker"] for row in store.rows.values()}
+    assert len(workers) == 2
+    _wait_until(lambda: not any(_runs(worker) for worker in workers))
+
+
 def test_the_table_holds_every_row_once(tmp_path: Path, chores: ModuleType) -> None:
     with ResultStore(tmp_path / "r.jsonl") as store:
         result = run_sweep(Task(chores.square), JOBS, Inline(), store)
@@ -137,6 +158,16 @@ def test_the_table_holds_every_row_once(tmp_path: Path, chores: ModuleType) -> N
         table = parquet.read_table(files[1])
         assert table.column("n").to_pylist() == [job["n"] for job in JOBS]
         assert table.column("profile").to_pylist() == [[1, 2]] * 20
+
+
+def _runs(pid: int) -> bool:
+    """Tell whether a process runs; one that is dead and not yet collected does not."""
+    try:
+        os.kill(pid, 0)
+        state = Path(f"/proc/{pid}/stat")
+        return not state.exists() or state.read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    except (ProcessLookupError, FileNotFoundError):
+        return False
 
 
 def _wait_until(condition: Callable[[], bool]) -> None:
