@@ -17,7 +17,7 @@ from tiegocancel.link.protocols import registry
 from tiegocancel.link.protocols.edvs.host import bytes_an_event
 from tiegocancel.link.protocols.options import ProtocolOptions
 
-from .conftest import decoded, encoded, rows, stream
+from .conftest import counted, decoded, encoded, rows, spoil, stream
 
 FORMATS = ("E0", "E1", "E2", "E3", "E4")
 
@@ -130,6 +130,23 @@ def test_lines_of_the_gyroscope_between_events_stay_out_of_band(edvs_format: str
     gyro = gyro_of_lines((line.t_us, line.text) for line in lines)
     assert gyro.malformed == 0
     assert gyro.samples is not None
+
+
+@pytest.mark.parametrize("edvs_format", ["E1", "E2", "E3", "E4"])
+@pytest.mark.parametrize("seed", range(4))
+def test_cuts_change_nothing_where_lines_resets_and_spoilt_bytes_meet(edvs_format: str, seed: int) -> None:
+    options = ProtocolOptions(edvs_format=edvs_format)
+    device = registry.device("edvs", options)
+    device.receive(b"!S+1152,1\n")
+    data = b"\nEDVS-4337, a banner\n" + device.encoder().encode(stream(seed, 100))
+    device.receive(b"!ET0\n")
+    data += device.encoder().encode(stream(seed + 1, 60))
+    if seed:
+        data, _ = spoil(data, seed, 0.01 * seed)
+    whole, cut = registry.decoder("edvs", options), registry.decoder("edvs", options)
+    assert rows(decoded(cut, data, range(1, len(data)))) == rows(decoded(whole, data))
+    assert counted(cut.counters) == counted(whole.counters)
+    assert cut.take_lines() == whole.take_lines()
 
 
 def test_a_half_line_waits_for_its_end() -> None:

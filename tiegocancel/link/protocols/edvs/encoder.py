@@ -126,8 +126,9 @@ class EdvsEncoder:
         self, heads: NDArray[np.uint8], stamps: NDArray[np.int64]
     ) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
         """Return the bytes of E1: 7 bits of the step a byte, most significant first, bit 7 on the last."""
-        steps = np.diff(stamps, prepend=self._last_us)
-        if int(steps.max()) >= 1 << 28 or int(steps.min()) < 0:
+        # A clock that was set back steps by nothing: a delta cannot say more.
+        steps = np.maximum(np.diff(stamps, prepend=self._last_us), 0)
+        if int(steps.max()) >= 1 << 28:
             raise ConfigError(f"E1 holds steps from 0 to {(1 << 28) - 1} µs, not {int(steps.max())}")
         self._last_us = int(stamps[-1])
         # The firmware's thresholds: the largest value of a length already goes into the next.
