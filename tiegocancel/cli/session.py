@@ -91,14 +91,20 @@ class Session:
         with (
             self._residual_writer(width, height, False) as sink,
             self._estimate_writer(found.feed),
+            event_progress("cancelling", None) if watch is None else contextlib.nullcontext() as advance,
         ):
+
+            def count(events: Events, decisions: Decisions | None, run: OnePass | None) -> None:
+                if advance is not None and len(events):
+                    advance(events)
+
             every = [*([] if sink is None else [sink.write]), *sinks]
 
             def hand_on(residual: Events) -> None:
                 for take in every:
                     take(residual)
 
-            result = run_live(link, self.settings, found.feed, sink=hand_on, watch=watch)
+            result = run_live(link, self.settings, found.feed, sink=hand_on, watch=watch or count)
             # What the device's end and the thread's have to say belongs into the report.
             link.close()
         return self._finish(result, found, sink, link.notes(), link=link.to_json())

@@ -18,6 +18,7 @@ __all__ = ["SerialLine"]
 
 _SLICE_BYTES = 1024
 _TIOCGICOUNT = 0x545D
+_POLL_S = 0.02
 _EMPTY_READS, _EMPTY_WAIT_S = 20, 0.001
 
 
@@ -42,8 +43,9 @@ class SerialLine:
                 baudrate=options.baud,
                 rtscts=options.rtscts,
                 exclusive=options.exclusive or None,
-                timeout=0,
-                write_timeout=options.write_timeout_s,
+                timeout=_POLL_S,
+                # RFC 2217 in pyserial knows none, and refuses the attempt.
+                write_timeout=None if port.lower().startswith("rfc2217:") else options.write_timeout_s,
             )
         except (OSError, ValueError, NotImplementedError) as error:
             raise LinkError(port, f"cannot be opened: {_reason(port, error)}") from None
@@ -70,14 +72,15 @@ class SerialLine:
             if data is None:
                 time.sleep(_EMPTY_WAIT_S)
             return data or b""
+        # The timeout stays as it is: a new one makes pyserial set up a port of another machine again.
+        deadline_s = time.monotonic() + timeout_s
         try:
-            self._serial.timeout = timeout_s
-            first: bytes = self._serial.read(1)
-            if not first or most < 2:
-                return first
-            self._serial.timeout = 0
-            rest: bytes = self._serial.read(min(most - 1, max(int(self._serial.in_waiting), 0)))
-            return first + rest
+            while not (waiting := int(self._serial.in_waiting)):
+                if time.monotonic() >= deadline_s:
+                    return b""
+                if first := bytes(self._serial.read(1)):
+                    return first + bytes(self._serial.read(min(most - 1, int(self._serial.in_waiting))))
+            return bytes(self._serial.read(min(most, waiting)))
         except (OSError, ValueError) as error:
             raise LinkError(self.port, f"the line is gone: {error}") from None
 

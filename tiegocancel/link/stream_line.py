@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import stat
 import sys
 from types import TracebackType
 from typing import Self
@@ -35,6 +36,7 @@ class StreamLine:
                 self._descriptor = os.open(name, flags | getattr(os, "O_BINARY", 0), 0o644)
             else:
                 self._descriptor = (sys.stdout if writes else sys.stdin).fileno()
+            self._regular = stat.S_ISREG(os.fstat(self._descriptor).st_mode)
         except (OSError, ValueError) as error:
             raise LinkError(self.port, f"cannot be opened: {getattr(error, 'strerror', None) or error}") from None
 
@@ -50,18 +52,30 @@ class StreamLine:
         """Return up to ``most`` bytes, as soon as there are any, nothing after ``timeout_s`` and at the end."""
         if self._writes or self.ended:
             return b""
-        data = read_some(self._descriptor, most, timeout_s, port=self.port)
+        if self._regular:
+            # Always ready, and some systems can wait for sockets only.
+            data = os.read(self._descriptor, most) or None
+        else:
+            data = read_some(self._descriptor, most, timeout_s, port=self.port)
         self.ended = data is None
         return data or b""
 
     def write(self, data: bytes) -> None:
         """Send all of ``data``, waiting for a slow reader as long as it takes."""
-        if self._writes:
+        if self._writes and self._regular:
+            rest = memoryview(data)
+            while rest:
+                rest = rest[os.write(self._descriptor, rest) :]
+        elif self._writes:
             write_all(self._descriptor, data, 86_400.0, port=self.port)
 
     def write_some(self, data: bytes, timeout_s: float) -> int:
         """Send what is taken within ``timeout_s``, perhaps nothing; return how many bytes that were."""
-        return write_some(self._descriptor, data, timeout_s, port=self.port) if self._writes else len(data)
+        if not self._writes:
+            return len(data)
+        if self._regular:
+            return os.write(self._descriptor, data)
+        return write_some(self._descriptor, data, timeout_s, port=self.port)
 
     def drop_input(self) -> None:
         """Keep what has come: a file holds nothing but the stream."""

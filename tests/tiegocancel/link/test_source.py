@@ -265,3 +265,45 @@ def test_a_port_without_counters_of_its_driver_tells_no_overruns(
 ) -> None:
     with open_line(serve(tiny.some_events(10)).port, line_options) as line:
         assert line.overruns() == 0
+
+
+def test_a_port_of_another_machine_is_a_line_too(tiny: SimpleNamespace, line_options: LineOptions) -> None:
+    """Serve RFC 2217 in front of a port that echoes, as the server that comes with pyserial does."""
+    import serial
+    import serial.rfc2217
+
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def serve() -> None:
+            peer, _ = server.accept()
+            port = serial.serial_for_url("loop://", timeout=0)
+
+            class Connection:
+                def write(self, data: bytes) -> None:
+                    peer.sendall(data)
+
+            manager = serial.rfc2217.PortManager(port, Connection())
+            peer.settimeout(0.02)
+            with peer, port:
+                while True:
+                    try:
+                        data = peer.recv(1024)
+                        if not data:
+                            return
+                        port.write(b"".join(manager.filter(data)))
+                    except TimeoutError:
+                        pass
+                    if echo := port.read(port.in_waiting):
+                        peer.sendall(b"".join(manager.escape(echo)))
+
+        thread = threading.Thread(target=serve)
+        thread.start()
+        data = bytes(range(256)) * 8  # with the bytes that the protocol must escape
+        with open_line(f"rfc2217://127.0.0.1:{server.getsockname()[1]}", line_options) as line:
+            line.write(data)
+            heard, deadline = b"", time.monotonic() + 10.0
+            while len(heard) < len(data) and time.monotonic() < deadline:
+                heard += line.read(100, 0.1)
+        assert heard == data
+        thread.join(5.0)
+        assert not thread.is_alive()
