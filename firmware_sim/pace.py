@@ -10,7 +10,7 @@ from tiegocancel.firmware_sim.outcome import Outcome
 from tiegocancel.events import Events
 from tiegocancel.matching.config import CancelConfig
 
-__all__ = ["link_table", "pace_constraints", "peak_rate_hz"]
+__all__ = ["burst_events", "link_table", "pace_constraints", "peak_rate_hz"]
 
 _PEAK_US = 1000
 
@@ -21,6 +21,20 @@ def peak_rate_hz(events: Events, span_us: int = _PEAK_US) -> float:
         return 0.0
     ends = np.searchsorted(events.t, events.t + span_us, side="left")
     return float((ends - np.arange(len(events))).max()) / span_us * 1e6
+
+
+def burst_events(outcome: Outcome, offer: Offer, *, input_depth: int) -> float:
+    """Return how many events may come as fast as they can before the input FIFO is full, from an idle device.
+
+    As fast as they can is one a cycle, or at the sensor's readout; ∞ where the device takes them as fast as that.
+    """
+    apart = 1.0
+    if offer.input.readout_events_per_second:
+        apart = max(outcome.clock_hz / offer.input.readout_events_per_second, 1.0)
+    if offer.input.link_bits_per_second:
+        apart = max(outcome.clock_hz * offer.input.bits_per_event / offer.input.link_bits_per_second, apart)
+    left = 1.0 - apart / outcome.pace.mean
+    return input_depth / left if left > 0 else float("inf")
 
 
 def pace_constraints(

@@ -18,8 +18,8 @@ class Verdict:
     """Say whether a device fits, keeps up, and why not.
 
     ``design``: the micro-architecture or firmware in words; ``memory`` and ``logic``: rows for people;
-    ``utilisation``: share of cycles that each port or unit is busy; ``energy``: in words; ``remarks``: what the
-    numbers rest on. ``outcome`` is ``None`` where the design could not be simulated.
+    ``utilisation``: share of cycles that each port or unit is busy; ``energy``: in words; ``burst_events``: how many may
+    come at once, ∞ for any number; ``remarks``: what the numbers rest on. ``outcome`` is ``None`` where the design could not be simulated.
     """
 
     target: str
@@ -33,6 +33,7 @@ class Verdict:
     utilisation: dict[str, float] = field(default_factory=dict)
     link: dict[str, Any] = field(default_factory=dict)
     energy: str = "no figure"
+    burst_events: float = math.nan
     startup_us: float = 0.0
     remarks: list[str] = field(default_factory=list)
 
@@ -91,6 +92,7 @@ class Verdict:
             "drops": outcome.drops,
             "lost_at_sensor": outcome.lost,
             "max_events_per_second": outcome.max_events_per_second,
+            "burst_events": self.burst_events if math.isfinite(self.burst_events) else None,
             "input_fifo_high_water": outcome.gauge.input_level().high_water,
             "output_fifo_high_water": outcome.gauge.output_level().high_water,
         }

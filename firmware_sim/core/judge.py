@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -15,7 +16,7 @@ from tiegocancel.firmware_sim.logic import LogicEstimate, estimate_logic
 from tiegocancel.firmware_sim.memory_map import MemoryMap, map_memories
 from tiegocancel.firmware_sim.offer import Offer
 from tiegocancel.firmware_sim.outcome import DEEP, Mode, Outcome, run_device
-from tiegocancel.firmware_sim.pace import link_table, pace_constraints
+from tiegocancel.firmware_sim.pace import burst_events, link_table, pace_constraints
 from tiegocancel.firmware_sim.target_fpga import FpgaTarget
 from tiegocancel.firmware_sim.verdict import Verdict
 
@@ -70,6 +71,7 @@ def judge_core(
         },
         utilisation=utilisation,
         link=link,
+        burst_events=math.nan if outcome is None else burst_events(outcome, offer, input_depth=design.core.input_depth),
         energy=energy.text,
         startup_us=design.startup_cycles / design.clock_hz * 1e6,
         remarks=remarks,

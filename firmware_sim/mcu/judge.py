@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,7 +12,7 @@ from tiegocancel.firmware_sim.mcu.config import McuConfig
 from tiegocancel.firmware_sim.mcu.simulator import McuSimulator
 from tiegocancel.firmware_sim.offer import Offer
 from tiegocancel.firmware_sim.outcome import DEEP, Mode, Outcome, run_device
-from tiegocancel.firmware_sim.pace import link_table, pace_constraints
+from tiegocancel.firmware_sim.pace import burst_events, link_table, pace_constraints
 from tiegocancel.firmware_sim.ram_map import RamMap
 from tiegocancel.firmware_sim.target_mcu import McuTarget
 from tiegocancel.firmware_sim.verdict import Verdict
@@ -136,6 +137,9 @@ def _judge(firmware: _Firmware, target: McuTarget, events: Events, offer: Offer)
         memory=_memory_rows(probe.ram),
         utilisation={} if outcome is None else _utilisation(outcome),
         link={} if outcome is None else link_table(outcome, events, offer),
+        burst_events=math.nan
+        if outcome is None
+        else burst_events(outcome, offer, input_depth=firmware.config.input_depth),
         energy=energy.text if outcome is not None else "no figure",
         remarks=[*remarks, f"cycles an event may be off by {probe.error_share:.0%}"],
         **common,

@@ -116,3 +116,21 @@ def test_a_line_of_text_shows_every_block() -> None:
     assert all(line.count("|") == 6 for line in lines)
     assert "issue match" in "\n".join(lines)
     assert lines[0].split("|")[1].split() == ["in", "0", "0"]
+
+
+def test_a_burst_of_the_length_that_is_told_is_taken_and_one_twice_as_long_is_not() -> None:
+    from tiegocancel.firmware_sim.offer import Offer
+    from tiegocancel.firmware_sim.outcome import run_device
+    from tiegocancel.firmware_sim.pace import burst_events
+
+    core = CoreConfig(input_depth=100, lookup="serial")
+    events, offer = stream(2000), Offer()
+
+    def make(mode: str) -> CoreSimulator:
+        return simulator(core, saturated=mode == "saturated")
+
+    outcome = run_device(make, events, offer, clock_hz=1e8, warm_up_us=0)
+    length = burst_events(outcome, offer, input_depth=core.input_depth)
+    for many, dropped in ((int(length) - 2, False), (int(2 * length), True)):
+        trace = simulator(core).process(events[:many], np.arange(many, dtype=np.int64))
+        assert trace.dropped.any() == dropped

@@ -96,7 +96,7 @@ def _pace_lines(one: Judged) -> list[str]:
     pace, latency, cycles = outcome.pace, outcome.latency_ns, outcome.gauge.latency()
     lines = [
         f"  cycles an event, saturated: {pace.least:.0f} least, {pace.mean:.2f} mean, {pace.p99:.0f} p99, "
-        f"{pace.most:.0f} most; sustains {outcome.max_events_per_second * 1e-6:.3g} Mev/s",
+        f"{pace.most:.0f} most; sustains {outcome.max_events_per_second * 1e-6:.3g} Mev/s and {_burst(one)}",
         f"  latency: {latency.p50:,.0f} ns p50, {latency.p99:,.0f} p99, {latency.most:,.0f} most "
         f"({cycles.p50:.0f}, {cycles.p99:.0f}, {cycles.most:.0f} cycles)",
         "  mean cycles by stage: "
@@ -131,6 +131,12 @@ def _pace_lines(one: Judged) -> list[str]:
     equal = {True: "equal", False: "DIFFER from", None: "not compared with"}[one.equal]
     lines.append(f"  decisions {equal} the golden model's on the events that were not dropped")
     return lines
+
+
+def _burst(one: Judged) -> str:
+    """Say how many events may come at once."""
+    burst = one.verdict.burst_events
+    return f"bursts of {burst:,.0f} events" if math.isfinite(burst) else "bursts of any length"
 
 
 def _cancelled(shares: object) -> str:
