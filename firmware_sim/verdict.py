@@ -18,8 +18,9 @@ class Verdict:
     """Say whether a device fits, keeps up, and why not.
 
     ``design``: the micro-architecture or firmware in words; ``memory`` and ``logic``: rows for people;
-    ``utilisation``: share of cycles that each port or unit is busy; ``energy``: in words; ``burst_events``: how many may
-    come at once, ∞ for any number; ``remarks``: what the numbers rest on. ``outcome`` is ``None`` where the design could not be simulated.
+    ``utilisation``: share of cycles that each port or unit is busy; ``energy``: in words; ``burst_events``: how many
+    may come at once, ∞ for any number; ``remarks``: what the numbers rest on. ``outcome`` is ``None`` where the design
+    could not be simulated.
     """
 
     target: str

@@ -39,17 +39,17 @@ class _Firmware:
     height: int
 
     def simulator(self, *, saturated: bool = False, link_q16: int = 0, deep: bool = False) -> McuSimulator:
-        """Return a simulator; ``deep`` gives it an input buffer that never fills, wherever that may lie."""
-        config = replace(self.config, input_depth=DEEP) if deep else self.config
+        """Return a simulator; ``deep`` gives it an input queue that never fills, its arrays where they are."""
         return McuSimulator(
             self.target,
-            config,
+            self.config,
             self.cancel,
             self.motion,
             width=self.width,
             height=self.height,
             saturated=saturated,
             link_q16=link_q16,
+            queue_depth=DEEP if deep else 0,
         )
 
 

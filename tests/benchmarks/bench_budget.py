@@ -10,7 +10,6 @@ import argparse
 import sys
 import time
 
-import numpy as np
 from tiegocancel.firmware_sim.core.config import CoreConfig
 from tiegocancel.firmware_sim.core.simulator import CoreSimulator
 from tiegocancel.firmware_sim.jit import is_compiled
@@ -59,6 +58,10 @@ def row(one: Judged) -> str:
     return f"| {verdict.target} | {word} | {verdict.binding.name} {margin} | {rate} | {latency} | {change} |"
 
 
+def share(value: float | None) -> str:
+    return "–" if value is None else f"{value:.3f}"
+
+
 def pace(ground: Ground, cancel: CancelConfig) -> float:
     """Return events a minute of the event-driven simulator, compiled before."""
     events, motion = ground.events, ground.motion(cancel)
@@ -84,8 +87,8 @@ def main() -> None:
         ]
         ideal = judged[0].ideal
         sys.stdout.write(
-            f"\n{size[0]}×{size[1]}: {rate * 1e-3:,.0f} kev/s, ego {ideal.ego or np.nan:.3f}, mover "
-            f"{ideal.mover or np.nan:.3f} without limits; {pace(ground, cancel) * 1e-6:.1f} M events a minute "
+            f"\n{size[0]}×{size[1]}: {rate * 1e-3:,.0f} kev/s, ego {share(ideal.ego)}, mover "
+            f"{share(ideal.mover)} without limits; {pace(ground, cancel) * 1e-6:.1f} M events a minute "
             f"simulated ({'compiled' if is_compiled() else 'plain Python'})\n\n"
             "| part | passes | binding | sustains (Mev/s) | p99 (µs) | smallest change |\n|---|---|---|---|---|---|\n"
         )
