@@ -42,9 +42,13 @@ def horizons(result: ThesisResult) -> Figure:
     for name in ("own", "gated", "zero", "reversed", "stream"):
         draw_curve(right, _curve(result, name), name)
     if result.results.labelled:
-        for name, words in (("gated", "mover lost, eq. (4.4)"), ("stream", "mover lost, streaming")):
-            lost = _curve(result, name, "mover_")
-            right.plot(lost.x / 1000, lost.y, color=LOOKS[name]["color"], linewidth=1.2, linestyle="-.", label=words)
+        for name, group, colour, words in (
+            ("gated", "mover_", LOOKS["gated"]["color"], "mover lost, eq. (4.4)"),
+            ("stream", "mover_", LOOKS["stream"]["color"], "mover lost, streaming"),
+            ("stream", "noise_", style.MOVER, "noise lost, streaming"),
+        ):
+            lost = _curve(result, name, group)
+            right.plot(lost.x / 1000, lost.y, color=colour, linewidth=1.2, linestyle="-.", label=words)
     right.set_title("the same, with the events before each window")
     for panel in (left, right):
         panel.plot(*zip(*_THESIS, strict=True), **THESIS)

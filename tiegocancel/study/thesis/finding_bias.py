@@ -8,7 +8,7 @@ from tiegocancel.study.thesis.experiments import base_of
 from tiegocancel.study.thesis.finding import Finding, percent
 from tiegocancel.study.thesis.study import ThesisResult
 
-__all__ = ["center_bias", "omega_bias", "polarity"]
+__all__ = ["adaptive", "center_bias", "omega_bias", "polarity"]
 
 
 def omega_bias(result: ThesisResult) -> Finding | None:
@@ -80,4 +80,26 @@ def polarity(result: ThesisResult) -> Finding | None:
         "enforcing costs 5–10 %", ours,
         f"Enforcing costs {100 * (any_ - own):.1f} points; read as (4.5) prints it, p_j = −p_i, it leaves "
         f"{percent(other)}: an edge keeps its polarity.",
+    )  # fmt: skip
+
+
+def adaptive(result: ThesisResult) -> Finding | None:
+    """Compare the gate that grows with the radius (5.5) with the fixed one, by what zero motion leaves."""
+    settings = result.settings
+    horizon_us = settings.point.long_horizon_us
+    ours: dict[str, str | None] = {}
+    values = {}
+    for name in ("gated", "zero"):
+        point = base_of(name, settings).at(horizon_us=horizon_us)
+        values[name] = [result.results.mean(point.at(adaptive=grows)) for grows in (False, True)]
+        ours[name] = " → ".join(percent(value) for value in values[name])
+    (fixed, grown), (still, still_grown) = values["gated"], values["zero"]
+    if fixed is None or grown is None or still is None or still_grown is None:
+        return None
+    before, after = fixed - still, grown - still_grown
+    word = "gains" if after > before + 0.01 else ("loses" if after < before - 0.01 else "changes nothing in")
+    return Finding(
+        "§5.5, (5.5)", f"fixed → adaptive spatial gate, {horizon_us / 1000:g} ms", "“optional”, no figure", ours,
+        f"The adaptive gate {word} distance to zero motion: {100 * before:.0f} points with the fixed gate, "
+        f"{100 * after:.0f} with it.",
     )  # fmt: skip

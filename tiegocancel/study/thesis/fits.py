@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,7 +35,7 @@ def fit_decay(curve: Curve) -> Decay | None:
 
     A curve that does not fall has no half-life: ``half_ms`` is then inf and the amplitude its mean.
     """
-    from scipy.optimize import curve_fit
+    from scipy.optimize import OptimizeWarning, curve_fit
 
     seen = np.isfinite(curve.y)
     x, y = curve.x[seen] / 1000, curve.y[seen]
@@ -44,7 +45,9 @@ def fit_decay(curve: Curve) -> Decay | None:
     def decay(horizon_ms: NDArray[np.float64], amplitude: float, rate: float) -> NDArray[np.float64]:
         return amplitude * np.exp2(-horizon_ms * rate)
 
-    (amplitude, rate), _ = curve_fit(decay, x, y, p0=(float(y[0]), 0.2), maxfev=10_000)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", OptimizeWarning)  # a flat curve bounds no rate; that is an answer too
+        (amplitude, rate), _ = curve_fit(decay, x, y, p0=(float(y[0]), 0.2), maxfev=10_000)
     if rate <= _NO_DECAY:
         return Decay(float(y.mean()), float("inf"), float(np.std(y)))
     left = y - decay(x, amplitude, rate)

@@ -11,7 +11,7 @@ from tiegocancel.study.thesis.claims import HEADLINES, RATIOS, RatioClaim
 from tiegocancel.study.thesis.columns import COLUMNS, counted
 from tiegocancel.study.thesis.experiments import GRID, base_of
 from tiegocancel.study.thesis.finding import MATTERS, Finding, against_control, percent
-from tiegocancel.study.thesis.finding_bias import center_bias, omega_bias, polarity
+from tiegocancel.study.thesis.finding_bias import adaptive, center_bias, omega_bias, polarity
 from tiegocancel.study.thesis.finding_space import clutter, density, distances, gap
 from tiegocancel.study.thesis.fits import cut_law, fit_decay
 from tiegocancel.study.thesis.ranking import rank, rank_gaps
@@ -29,7 +29,7 @@ def summarise(result: ThesisResult) -> list[Finding]:
     lines = [_ratio(result, claim) for claim in RATIOS]
     extra = (
         _headline(result), _half_life(result), _ranking(result), gap(result), distances(result), omega_bias(result),
-        center_bias(result), polarity(result), density(result), clutter(result),
+        center_bias(result), polarity(result), adaptive(result), density(result), clutter(result),
     )  # fmt: skip
     return [line for line in (*lines, *extra) if line is not None]
 
