@@ -15,6 +15,7 @@ from tiegocancel.errors import ConfigError
 
 if TYPE_CHECKING:
     from tiegocancel.estimation.inertial.live import LiveGyro
+    from tiegocancel.estimation.paced import PacedEstimator
     from tiegocancel.events import Events
     from tiegocancel.link.live_view import LiveView
     from tiegocancel.link.source import LinkSource
@@ -63,6 +64,7 @@ def run_link(args: argparse.Namespace) -> int:
         if gyro is not None:
             link.on_lines = lambda lines: gyro.add((said.t_us, said.text) for said in lines)
         found = _motion(settings, gyro, width, height)
+        paced = _paced(found, args.source)
         sinks = []
         if args.residual_to is not None:
             onward = replace(line, baud=args.residual_baud or line.baud)
@@ -72,7 +74,8 @@ def run_link(args: argparse.Namespace) -> int:
         inputs = [file for file in [Path(args.source), *motion_inputs(settings)] if file.is_file()]
         session = Session(args, settings, title=args.source, inputs=inputs)
         view = None if args.view is None and not args.live else stack.enter_context(_view(args, link))
-        return session.run_link(link, found, width=width, height=height, sinks=sinks, watch=view)
+        more_notes = list if paced is None else paced.notes
+        return session.run_link(link, found, width=width, height=height, sinks=sinks, watch=view, more_notes=more_notes)
 
 
 def _view(args: argparse.Namespace, link: LinkSource) -> LiveView:
@@ -142,6 +145,17 @@ def _motion(settings: Settings, gyro: LiveGyro | None, width: int, height: int) 
         fusion = ExponentialFusion(ExponentialConfig(alpha=estimate.alpha, event_alpha=estimate.alpha))
     estimator = LiveFusedEstimator(of_events, gyro, fusion, follow_bias=rests)
     return Found(TrackedMotion(estimator, source="track, gyro of the link"))
+
+
+def _paced(found: Found, source: str) -> PacedEstimator | None:
+    """Keep a motion that is found on the way in time with a port; bytes of a file wait for it."""
+    from tiegocancel.estimation.paced import PacedEstimator
+    from tiegocancel.link.opening import is_port
+    from tiegocancel.study.feed import TrackedMotion
+
+    if source == "-" or not is_port(source) or not isinstance(found.feed, TrackedMotion):
+        return None
+    return found.feed.wrapped(PacedEstimator)
 
 
 def _no_sample() -> Events:

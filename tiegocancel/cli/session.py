@@ -85,6 +85,7 @@ class Session:
         height: int,
         sinks: Sequence[Callable[[Events], None]] = (),
         watch: Watcher | None = None,
+        more_notes: Callable[[], list[str]] = list,
     ) -> int:
         """Run over a live link; ``sinks`` take the residual of each chunk too. Return the exit code as :meth:`run`."""
         self.folder.prepare()
@@ -107,7 +108,7 @@ class Session:
             result = run_live(link, self.settings, found.feed, sink=hand_on, watch=watch or count)
             # What the device's end and the thread's have to say belongs into the report.
             link.close()
-        return self._finish(result, found, sink, link.notes(), link=link.to_json())
+        return self._finish(result, found, sink, [*link.notes(), *more_notes()], link=link.to_json())
 
     def run_with_device(
         self,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bisect
 import itertools
 from collections.abc import Callable, Sequence
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import numpy as np
 
@@ -20,6 +20,8 @@ from tiegocancel.motion.trajectory import Trajectory
 __all__ = ["FixedMotion", "MotionFeed", "ScheduledMotion", "TrackedMotion", "fixed_schedule"]
 
 MAX_ENTRIES = 1 << 20
+
+Wrapped = TypeVar("Wrapped", bound=Estimator)
 
 
 class MotionFeed(Protocol):
@@ -130,6 +132,12 @@ class TrackedMotion:
         self._estimator = estimator
         self._known: list[MotionEstimate] = []
         self._sure_us: list[int] = []
+
+    def wrapped(self, wrap: Callable[[Estimator], Wrapped]) -> Wrapped:
+        """Put something around the estimator, before the first chunk, and return it."""
+        outer = wrap(self._estimator)
+        self._estimator = outer
+        return outer
 
     def advance(self, chunk: Events) -> None:
         """Take the rows that a chunk makes due."""
