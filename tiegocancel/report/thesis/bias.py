@@ -82,6 +82,8 @@ def model_error(result: ThesisResult) -> Figure | None:
 
 
 def _line(panel: Axes, curve: Curve, colour: str, dash: str, words: str | None) -> None:
+    if not np.isfinite(curve.y).any():
+        return
     panel.plot(curve.x, curve.y, color=colour, linestyle=dash, linewidth=1.5, label=words)
     if dash == "-" and curve.windows > 1:
         panel.fill_between(curve.x, curve.y - curve.sd, curve.y + curve.sd, color=colour, alpha=0.15, linewidth=0)

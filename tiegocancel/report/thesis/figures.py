@@ -28,8 +28,9 @@ _FIGURES: tuple[tuple[str, str, Callable[[ThesisResult], Figure | None], str], .
         "fig_7_1_horizons", "Fig. 7.1 · Cancellation against the horizon", horizons,
         "Crosses are the thesis's values. Left its protocol: the window is cut out of the recording, so that a "
         "prediction made in its last Δt meets nothing and an event of its first Δt was never predicted; the dashed "
-        "line is what that alone allows. Right the same gates with the events before the window, own predictions "
-        "allowed and forbidden, beside zero and reversed motion and what the mover loses.",
+        "line is what that alone allows. Right the same gates without that: led in by what comes before the window, "
+        "or the warm-up not counted; own predictions allowed and forbidden, beside zero and reversed motion and what "
+        "the mover loses.",
     ),
     (
         "fig_7_2_heatmaps", "Fig. 7.2 · Cancellation against both gates", heatmaps,
@@ -102,7 +103,7 @@ _FIGURES: tuple[tuple[str, str, Callable[[ThesisResult], Figure | None], str], .
 _PICTURES = (
     ("fig_7_6_before_after", "Fig. 7.6 · Before and after, as printed"),
     ("fig_7_8_failure", "Fig. 7.8 · The failure case, as printed"),
-    ("fig_7_6_long_horizon", "Fig. 7.6, questioned · A long horizon with its lead"),
+    ("fig_7_6_long_horizon", "Fig. 7.6, questioned · A long horizon, warm-up not counted"),
 )
 
 
@@ -115,7 +116,7 @@ def draw_thesis_figures(result: ThesisResult, folder: Path) -> list[Drawing]:
         for (name, title), panels in zip(_PICTURES, result.pictures, strict=False):
             point = panels.point
             own = "own predictions allowed" if point.own else "own predictions forbidden"
-            cut = "window cut out" if point.isolated else "with the events before it"
+            cut = "window cut out" if point.isolated else "warm-up not counted"
             kept = panels.left_over
             caption = (
                 f"Δt = {point.horizon_us / 1000:g} ms, ε_xy = {point.tolerance_px:g} px, ε_t = "

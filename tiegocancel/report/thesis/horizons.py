@@ -49,7 +49,7 @@ def horizons(result: ThesisResult) -> Figure:
         ):
             lost = _curve(result, name, group)
             right.plot(lost.x / 1000, lost.y, color=colour, linewidth=1.2, linestyle="-.", label=words)
-    right.set_title("the same, with the events before each window")
+    right.set_title("the same gates, warm-up led in or not counted")
     for panel in (left, right):
         panel.plot(*zip(*_THESIS, strict=True), **THESIS)
         panel.set_xlabel("prediction horizon Δt (ms)")

@@ -86,10 +86,10 @@ def _lead(result: ThesisResult) -> str:
         "<section class='card'><h2>How to read this</h2><p>Every ratio of the thesis is measured in steps, each of "
         "which takes one artefact away: <b>as printed</b>, Algorithm 1 on windows that are cut out of the recording; "
         "<b>own off</b>, no event may meet its own prediction; <b>(4.4), pairs</b>, the text's symmetric gate with "
-        "both events of a pair counted, windows cut out; <b>(4.4), own off, lead</b>, the same gate one count an "
-        "event and with the events before the window; <b>zero motion</b>, that again while being told that nothing "
-        "moves; <b>streaming</b>, the canceller of this package. A ratio that zero motion reaches too shows no "
-        "prediction at work.</p></section>"
+        "both events of a pair counted, windows cut out; <b>(4.4), own off, no warm-up</b>, the same gate one count "
+        "an event, led in by what comes before the window, or else without the warm-up; <b>zero motion</b>, that "
+        "again while being told that nothing moves; <b>streaming</b>, the canceller of this package. A ratio that "
+        "zero motion reaches too shows no prediction at work.</p></section>"
     )
 
 
@@ -124,14 +124,15 @@ def _compensation(comparisons: Sequence[Comparison]) -> str:
     if not comparisons:
         return ""
     heads = (
-        "window", "events", "variance, warped", "variance, residual", "gradient, warped", "gradient, residual",
+        "window", "events", "Δt", "variance, warped", "variance, residual", "gradient, warped", "gradient, residual",
         "sent on", "fit", "warp", "streaming", "ω of the fit",
     )  # fmt: skip
     rows = []
     for one in comparisons:
         omega = "not confident" if one.fit_omega_rad_s is None else f"{one.fit_omega_rad_s:.3f} rad/s"
         cells = (
-            one.window, f"{one.events:,}", f"×{one.variance['warped']:.2f}", f"×{one.variance['residual']:.2f}",
+            one.window, f"{one.events:,}", f"{one.horizon_us / 1000:g} ms",
+            f"×{one.variance['warped']:.2f}", f"×{one.variance['residual']:.2f}",
             f"×{one.gradient['warped']:.2f}", f"×{one.gradient['residual']:.2f}", f"{1 - one.suppressed:.1%}",
             f"{one.fit_s:.2f} s", f"{1000 * one.warp_s:.1f} ms", f"{1000 * one.cancel_s:.1f} ms", omega,
         )  # fmt: skip

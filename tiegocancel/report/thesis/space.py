@@ -42,13 +42,13 @@ def radial(result: ThesisResult) -> Figure | None:
         column[0].set(title=f"Δt = {horizon_us / 1000:g} ms", ylim=(0, None))
         style.tidy(column[0])
         percent_axis(column[1])
-        column[1].set(xlabel="distance from the centre (px)", xlim=(0, 1.5 * result.bench.radius_px))
+        column[1].set(xlabel="distance from the centre (px)", xlim=(0, 1.2 * result.bench.radius_px))
         for panel in column:
             panel.axvline(result.bench.radius_px, color=style.MUTED, linestyle="--", linewidth=0.8)
     axes[0, 0].set_ylabel("events a pixel")
     axes[1, 0].set_ylabel("suppressed")
     axes[0, 0].legend(fontsize=7)
-    axes[1, 0].legend(fontsize=7, loc="lower right")
+    axes[1, 0].legend(fontsize=7, loc="lower center")
     return drawn if seen else None
 
 

@@ -8,12 +8,12 @@ COLUMNS = {
     "printed": "as printed",
     "printed_off": "own off",
     "cut": "(4.4), pairs",
-    "gated": "(4.4), own off, lead",
+    "gated": "(4.4), own off, no warm-up",
     "zero": "control: zero motion",
     "stream": "streaming",
 }
-"""Series of the summary's columns: the first three on windows that were cut out, as the thesis did, the rest with what
-comes before them."""
+"""Series of the summary's columns: the first three on windows that were cut out, as the thesis did; in the rest what
+comes before a window leads into it, and where nothing does, the warm-up is not counted."""
 
 
 def counted(name: str) -> str:

@@ -39,7 +39,7 @@ class Images:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """What both methods did to one window, from one run on one machine.
+    """What both methods did to one window, from one run on one machine; the canceller at ``horizon_us``.
 
     ``variance`` and ``gradient`` of each image, relative to the original; ``fit_*``: contrast maximisation from scratch
     (seconds, peak bytes; ω found, ``None`` where it fails); ``warp_s``: only warping and splatting, the motion known;
@@ -49,6 +49,7 @@ class Comparison:
 
     window: str
     events: int
+    horizon_us: int
     variance: dict[str, float]
     gradient: dict[str, float]
     fit_s: float
@@ -87,8 +88,12 @@ def compare_compensation(bench: Bench, settings: ThesisSettings) -> tuple[list[C
 
 def _compare(bench: Bench, place: int, settings: ThesisSettings) -> tuple[Comparison, Images] | None:
     window = bench.windows[place]
-    horizon_us, gate_us = settings.point.long_horizon_us, settings.point.tolerance_us
-    first_us = max(window.start_us, int(window.events.t[0]) + horizon_us + gate_us)
+    gate_us = settings.point.tolerance_us
+    horizon_us, first_us = settings.point.long_horizon_us, 0
+    for horizon_us in (settings.point.long_horizon_us, settings.point.horizon_us):
+        first_us = max(window.start_us, int(window.events.t[0]) + horizon_us + gate_us)
+        if window.stop_us - first_us >= (window.stop_us - window.start_us) / 2:
+            break  # where nothing comes before the window, the long horizon would leave too little of it
     part = window.events.between(first_us, window.stop_us)
     if len(part) < 1000 or part.span_us == 0:
         return None
@@ -117,6 +122,7 @@ def _compare(bench: Bench, place: int, settings: ThesisSettings) -> tuple[Compar
     comparison = Comparison(
         window=window.name,
         events=len(part),
+        horizon_us=horizon_us,
         variance=sharp["variance"],
         gradient=sharp["gradient_energy"],
         fit_s=fit_s,

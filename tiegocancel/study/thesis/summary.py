@@ -80,8 +80,8 @@ def _ratio_verdict(
     allowed = float(cut_law(np.array([float(claim.horizon_us)]), length_us)[0])
     if claim.horizon_us and allowed < 1.0 and true is not None and true - claim.value > _CLOSE:
         words.append(
-            f"a window of {length_us / 1000:g} ms that is cut out allows {percent(allowed)} at most, with its lead the "
-            f"same gates cancel {percent(true)}"
+            f"a window of {length_us / 1000:g} ms that is cut out allows {percent(allowed)} at most; without "
+            f"the warm-up the same gates cancel {percent(true)}"
         )
     if true is not None and zero is not None:
         words.append(against_control(true, zero))
@@ -146,11 +146,11 @@ def _half_life(result: ThesisResult) -> Finding:
     elif math.isinf(true.half_ms) or true.half_ms > 5 * cut.half_ms:
         slow = "no decay at all" if math.isinf(true.half_ms) else f"a half-life of {true.half_ms:.0f} ms"
         verdict += (
-            f": with events before the window the curve shows {slow}; cut out, a window of {length_us / 1000:g} ms "
+            f": without the warm-up the curve shows {slow}; cut out, a window of {length_us / 1000:g} ms "
             "falls as 1 − Δt/T whatever the motion"
         )
     else:
-        verdict = f"With events before the window the half-life is {true.half_ms:.1f} ms"
+        verdict = f"Without the warm-up the half-life is {true.half_ms:.1f} ms"
     still = fits["zero"]
     if still is not None and abs(still.half_ms - _HALF_LIFE_MS) <= 0.15 * _HALF_LIFE_MS:
         verdict += f"; a half-life of {still.half_ms:.1f} ms is what zero motion has"
