@@ -132,7 +132,7 @@ class Player:
         places = np.floor(self._phase + share * np.arange(1, len(events) + 1))
         kept = np.diff(places, prepend=np.floor(self._phase)) > 0
         self._phase = float((self._phase + share * len(events)) % 1.0)
-        self._say_full(f"events are thinned out evenly ({rate_text(len(events) / _SLICE_S)} come)")
+        self._say_full(f"events are thinned out evenly ({rate_text(len(events) / _SLICE_S)} come)", by_line=True)
         return events.select(kept)
 
     def _put(self, data: bytes, due_s: float, events: int = 0) -> bool:
@@ -144,7 +144,7 @@ class Player:
             lag_s = begin_s - due_s if self.pace.speed else 0.0
             self.played.lag_s = max(self.played.lag_s, lag_s)
             if lag_s > _LATE_S and self.pace.when_full == "slow":
-                self._say_full("the playback is slowed down")
+                self._say_full("the playback is slowed down", by_line=begin_s <= max(due_s, self._free_s))
         if begin_s > now_s:
             self._sleep(begin_s - now_s)
         self._free_s = begin_s + (len(data) / self.pace.bytes_per_s if self.pace.bytes_per_s else 0.0)
@@ -152,17 +152,19 @@ class Player:
         self.played.sent += events
         return self._send(data)
 
-    def _say_full(self, consequence: str) -> None:
-        """Say once that the line does not carry the stream."""
+    def _say_full(self, consequence: str, *, by_line: bool) -> None:
+        """Say once that the line, or else the other end, does not take the stream."""
         if self._told:
             return
         self._told = True
         each = self.played.bytes / max(self.played.sent, 1)
         limit = self.pace.bytes_per_s
-        carries = f"the line carries {limit:,.0f} bytes/s" if limit else "the other end does not take it"
-        if limit and each:
-            carries += f", about {rate_text(limit / each)} at {each:.2f} bytes an event"
+        at = f"from {self.played.recording_s:.3f} s of the recording on"
+        if not by_line or not limit:
+            self._tell(f"{at} the other end takes less than it is sent: {consequence}")
+            return
+        rate = f", about {rate_text(limit / each)} at {each:.2f} bytes an event" if each else ""
         self._tell(
-            f"{carries}; from {self.played.recording_s:.3f} s of the recording on that is not enough at "
-            f"speed {self.pace.speed:g}: {consequence}"
+            f"the line carries {limit:,.0f} bytes/s{rate}; {at} that is not enough at speed {self.pace.speed:g}: "
+            f"{consequence}"
         )

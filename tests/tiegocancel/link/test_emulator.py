@@ -95,6 +95,22 @@ def test_a_slow_line_may_thin_the_stream_out_and_counts_it(tiny: SimpleNamespace
     assert "thinned out evenly" in said[0]
 
 
+def test_an_end_that_takes_too_little_is_told_from_a_line_that_does(tiny: SimpleNamespace) -> None:
+    clock, said = [0.0], []  # type: ignore[var-annotated]
+
+    def send(data: bytes) -> bool:
+        clock[0] += 0.05 if data else 0.0  # the other end is slow to take it
+        return True
+
+    def sleep(seconds: float) -> None:
+        clock[0] += seconds
+
+    player = Player(Pace(bytes_per_s=1e6), send, said.append, now_s=lambda: clock[0], sleep=sleep)
+    player.play([tiny.some_events(2000)], tiny.Encoder())
+    assert len(said) == 1
+    assert "the other end takes less than it is sent: the playback is slowed down" in said[0]
+
+
 def test_a_recording_can_be_repeated_in_time(tiny: SimpleNamespace) -> None:
     events = tiny.some_events(100)
     whole = Events.concatenate(list(repeated(lambda: [events[:40], events[40:]], 3)))

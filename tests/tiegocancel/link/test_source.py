@@ -122,9 +122,11 @@ def test_at_low_rates_an_event_is_held_no_longer_than_the_bound(
     serving = serve(events, speed=1.0)
     queue = QueueOptions(hold_s=0.005)
     link = tiny.source(serving.port, line_options, queue=queue, limits=Limits(max_events=300))
-    assert len(tiny.received(link)) == 300
-    # The bound is 5 ms; the rest is what a loaded machine needs to wake a thread.
-    assert link.latency.quantile(0.5) < 0.02
+    with link:
+        chunks = [chunk for chunk in link if len(chunk)]
+    assert sum(map(len, chunks)) == 300
+    # 300 ms in pieces of 5 ms; a loaded machine makes fewer and longer ones of them.
+    assert len(chunks) > 10
 
 
 def test_a_limit_in_time_stops_the_device(serve: Serve, tiny: SimpleNamespace, line_options: LineOptions) -> None:
