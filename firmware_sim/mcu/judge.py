@@ -162,15 +162,19 @@ def _fit(probe: McuSimulator, firmware: _Firmware, target: McuTarget) -> list[Co
     ]
     homeless = [one.array for one in ram.placements if not one.fits]
     if homeless and ram.need_bytes <= ram.have_bytes:
+        largest = max(array.bytes for array in homeless)
+        within_reach = ram.largest_free_bytes < largest  # otherwise what is free is where DMA does not reach
         found.append(
             Constraint(
                 name="RAM in one piece",
                 kind="fit",
-                need=max(array.bytes for array in homeless),
-                have=ram.largest_free_bytes,
+                need=largest,
+                have=ram.largest_free_bytes if within_reach else 0,
                 unit="bytes",
                 evidence="exact",
-                note="for " + ", ".join(array.name for array in homeless),
+                note="for "
+                + ", ".join(array.name for array in homeless)
+                + ("" if within_reach else ", that DMA reaches"),
             )
         )
     if abs(firmware.target.core.mhz - target.core.mhz) > 1e-6:

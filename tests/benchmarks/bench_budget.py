@@ -27,7 +27,7 @@ SIZES = {(1280, 720): 0.1, (640, 480): 0.15, (320, 240): 0.4, (128, 128): 0.6}
 """Sensor size in px and seconds of the scene: longer where it is slow, for the warm-up."""
 
 # A ring for what the scene holds at its rate, and a table in sets for what is open at once; a small sensor is slow.
-RINGS = {(1280, 720): 49_152, (640, 480): 12_288, (320, 240): 4_096, (128, 128): 1_024}
+RINGS = {(1280, 720): 49_152, (640, 480): 16_384, (320, 240): 5_120, (128, 128): 1_024}
 SETS = {(1280, 720): (6, 5), (640, 480): (5, 4), (320, 240): (4, 4), (128, 128): (3, 3)}
 SLOWER = {(1280, 720): 1, (640, 480): 2, (320, 240): 4, (128, 128): 8}
 """Times of the preset are multiplied by this: edges of a smaller disc run so many times slower."""
