@@ -32,7 +32,7 @@ def blocks(text: str, language: str) -> list[str]:
 def commands(text: str) -> list[list[str]]:
     """Return the tiegocancel commands of the README in order; installing is what CI does around this test."""
     lines = [line for block in blocks(text, "bash") for line in block.splitlines()]
-    parts = [part.strip() for line in lines for part in line.split("&&")]
+    parts = [part.strip() for line in lines for part in re.split("&&|;", line)]
     return [shlex.split(part, comments=True) for part in parts if part.startswith("tiegocancel")]
 
 
@@ -72,8 +72,9 @@ def test_every_command_of_the_readme_runs(readme: str, folder: Path) -> None:
     assert {words[1] for words in ran} == verbs
     with contextlib.ExitStack() as background:
         for words in ran:
-            if words[-1] == "&":
-                device = subprocess.Popen([sys.executable, "-m", *words[:-1]], cwd=folder, stderr=subprocess.DEVNULL)
+            if "&" in words:
+                command = [sys.executable, "-m", *words[: words.index("&")]]
+                device = subprocess.Popen(command, cwd=folder, stderr=subprocess.DEVNULL)
                 background.callback(device.wait)
                 background.callback(device.terminate)
                 wait_for(folder / words[words.index("--symlink") + 1])

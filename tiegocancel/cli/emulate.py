@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import signal
 import sys
 import time
 from pathlib import Path
@@ -49,6 +50,7 @@ def run(args: argparse.Namespace) -> int:
     from tiegocancel.errors import ConfigError
     from tiegocancel.link.pseudo_terminal import PseudoTerminal
 
+    signal.signal(signal.SIGTERM, _leave)
     if args.canceller is not None:
         return _cancel(args)
     if args.source is None:
@@ -69,6 +71,11 @@ def run(args: argparse.Namespace) -> int:
         while args.once and not code and line.unread and time.monotonic() < deadline_s:
             time.sleep(0.01)
         return code
+
+
+def _leave(number: int, frame: object) -> None:
+    """Go the orderly way when terminated, so that no second name of a port is left behind."""
+    raise SystemExit(128 + number)
 
 
 def _cancel(args: argparse.Namespace) -> int:

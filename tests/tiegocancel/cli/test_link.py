@@ -223,7 +223,10 @@ def test_ctrl_c_ends_a_live_run_with_everything_on_disk(events: Events, emulate:
     assert (out / "report.html").exists()
 
 
-def test_emulate_and_run_talk_to_each_other(recording: Path, events: Events, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("end", "code"), [(signal.SIGINT, 0), (signal.SIGTERM, 143)])
+def test_emulate_and_record_talk_to_each_other(
+    recording: Path, events: Events, tmp_path: Path, end: signal.Signals, code: int
+) -> None:
     name = tmp_path / "dvs0"
     device = started("emulate", recording, *FLAGS, "--symlink", name)
     try:
@@ -236,9 +239,9 @@ def test_emulate_and_run_talk_to_each_other(recording: Path, events: Events, tmp
         assert host.returncode == 0, talk.decode()
         assert same(read_events(tmp_path / "copy.npz"), events)
     finally:
-        device.send_signal(signal.SIGINT)
+        device.send_signal(end)
         said, _ = device.communicate(timeout=10.0)
-    assert device.returncode == 0
+    assert device.returncode == code
     assert said.decode().startswith("/dev/pts/")
     assert not name.is_symlink()
 
