@@ -171,12 +171,13 @@ class ThesisSettings:
                 self.grid,
                 horizons_us=tuple(h for h in self.grid.horizons_us if h in keep),
                 tolerances_px=self.grid.tolerances_px[::2],
-                tolerances_us=tuple(dict.fromkeys((*self.grid.tolerances_us[:2], self.grid.tolerances_us[-1]))),
+                tolerances_us=tuple(dict.fromkeys((*self.grid.tolerances_us[1:2], self.grid.tolerances_us[-1]))),
             ),
             bias=replace(
                 self.bias,
                 omega_rad_s=tuple(dict.fromkeys((*self.bias.omega_rad_s[:2], *self.bias.omega_rad_s[4::2]))),
                 center_px=self.bias.center_px[::3],
+                horizons_us=self.bias.horizons_us[:2],
             ),
             gates=replace(self.gates, tolerances_us=self.gates.tolerances_us[::2]),
             agreement=replace(
