@@ -11,6 +11,7 @@ from tiegocancel.firmware_sim.core.function import OP_FIELDS, op_room
 from tiegocancel.firmware_sim.core.loop import DROPPED, SUPPRESSED, run_chunk
 from tiegocancel.firmware_sim.core.plan import CAUSES, WORK, lay_out_clock, lay_out_plan
 from tiegocancel.firmware_sim.core.rule import COUNTS, lay_out_rule, lay_out_state
+from tiegocancel.firmware_sim.intake import Intake
 
 from tiegocancel.events import Events
 from tiegocancel.matching.config import CancelConfig
@@ -80,7 +81,7 @@ class CoreSimulator:
         self.clock = lay_out_clock(self.plan)
         self._saturated = saturated
         self._ops = np.zeros((op_room(self.state), OP_FIELDS), np.int64)
-        self._last_arrival = -1
+        self._intake = Intake("core", width=width, height=height, saturated=saturated)
 
     @property
     def counts(self) -> dict[str, int]:
@@ -102,19 +103,8 @@ class CoreSimulator:
 
         Raise ``ValueError`` where arrivals do not rise or the sensor's size differs.
         """
-        if (events.width, events.height) != (self.width, self.height):
-            raise ValueError(
-                f"events of {events.width}×{events.height} px do not fit a core of {self.width}×{self.height} px"
-            )
+        arrival = self._intake.arrivals(events, arrival)
         count = len(events)
-        if arrival is None:
-            if not self._saturated:
-                raise ValueError("arrivals must be given unless the core is saturated")
-            arrival = np.full(count, -1, np.int64)
-        elif not self._saturated and count:
-            if len(arrival) != count or arrival[0] <= self._last_arrival or (np.diff(arrival) < 1).any():
-                raise ValueError("arrivals must rise by at least one cycle from event to event")
-            self._last_arrival = int(arrival[-1])
         fate, cycles = np.zeros(count, np.uint8), np.zeros((count, 6), np.int64)
         run_chunk(
             self.rule,
@@ -125,7 +115,7 @@ class CoreSimulator:
             events.x,
             events.y,
             events.p,
-            np.ascontiguousarray(arrival, np.int64),
+            arrival,
             int(self._saturated),
             self._ops,
             fate,

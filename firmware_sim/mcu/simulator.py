@@ -10,6 +10,7 @@ from tiegocancel.firmware_sim.core.function import OP_FIELDS, op_room
 from tiegocancel.firmware_sim.core.loop import DROPPED, SUPPRESSED
 from tiegocancel.firmware_sim.core.rule import COUNTS, lay_out_rule, lay_out_state
 from tiegocancel.firmware_sim.core.simulator import CoreTrace
+from tiegocancel.firmware_sim.intake import Intake
 from tiegocancel.firmware_sim.mcu.config import McuConfig
 from tiegocancel.firmware_sim.mcu.costs import loop_table
 from tiegocancel.firmware_sim.mcu.layout import WordLayout, fits_32_bits, lay_out_words
@@ -93,7 +94,7 @@ class McuSimulator:
             self.clock = lay_out_clock(self.plan, len(cancel.horizons_us))
         self._saturated = saturated
         self._ops = np.zeros((op_room(self.state), OP_FIELDS), np.int64)
-        self._last_arrival = -1
+        self._intake = Intake("firmware", width=width, height=height, saturated=saturated)
 
     def _lay_out_plan(self, link_q16: int) -> Plan:
         target, config, cancel, words = self.target, self.config, self.cancel, self.words
@@ -191,19 +192,8 @@ class McuSimulator:
         Of the trace, ``taken``, ``first`` and ``issued`` are the start of the decision. Raise ``ValueError`` where
         arrivals do not rise or the sensor's size differs.
         """
-        if (events.width, events.height) != (self.width, self.height):
-            raise ValueError(
-                f"events of {events.width}×{events.height} px do not fit a firmware for {self.width}×{self.height} px"
-            )
+        arrival = self._intake.arrivals(events, arrival)
         count = len(events)
-        if arrival is None:
-            if not self._saturated:
-                raise ValueError("arrivals must be given unless the firmware is saturated")
-            arrival = np.full(count, -1, np.int64)
-        elif not self._saturated and count:
-            if len(arrival) != count or arrival[0] <= self._last_arrival or (np.diff(arrival) < 1).any():
-                raise ValueError("arrivals must rise by at least one cycle from event to event")
-            self._last_arrival = int(arrival[-1])
         fate, cycles = np.zeros(count, np.uint8), np.zeros((count, 4), np.int64)
         run_chunk(
             self.rule,
@@ -214,7 +204,7 @@ class McuSimulator:
             events.x,
             events.y,
             events.p,
-            np.ascontiguousarray(arrival, np.int64),
+            arrival,
             int(self._saturated),
             self._ops,
             fate,
