@@ -39,9 +39,7 @@ def _kernel(chained):
         flip: ti.types.ndarray(dtype=ti.i32, ndim=1),  # [m] 0: polarities agree, 1: they differ, 2: whatever they are
         window: ti.types.ndarray(dtype=ti.i32, ndim=2),  # [m, 2] first and last entry of `offsets`
         offsets: ti.types.ndarray(dtype=ti.i32, ndim=1),  # linear, nearest first
-        entries: ti.types.ndarray(
-            dtype=ti.i32, ndim=2
-        ),  # [m, S + 1] rows of events at which the entry changes
+        entries: ti.types.ndarray(dtype=ti.i32, ndim=2),  # [m, S + 1] rows of events at which the entry changes
         coefficients: ti.types.ndarray(dtype=ti.i64, ndim=3),  # [m, S, 6] a b c d e f, 16 fractional bits
         cells: ti.types.ndarray(dtype=ti.i32, ndim=2),  # [m, table], overwritten
         older: ti.types.ndarray(dtype=ti.i32, ndim=2),  # [m, n] the rest of each chain, [m, 1] when not chained
