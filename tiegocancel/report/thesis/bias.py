@@ -8,9 +8,10 @@ from matplotlib.figure import Figure
 
 from tiegocancel.report import style
 from tiegocancel.report.thesis.series import THESIS, percent_axis
+from tiegocancel.study.sweep import Row
 from tiegocancel.study.thesis.experiments import base_of
 from tiegocancel.study.thesis.model_error import ErrorCurve
-from tiegocancel.study.thesis.results import Curve
+from tiegocancel.study.thesis.results import Curve, share
 from tiegocancel.study.thesis.study import ThesisResult
 
 __all__ = ["bias", "model_error"]
@@ -19,43 +20,60 @@ _COLOURS = (style.RESIDUAL, style.OFF, style.NOISE, style.MOVER)
 
 
 def bias(result: ThesisResult) -> Figure:
-    """Draw CR against the error of ω and of the centre, a curve for each horizon, zero motion as a line."""
+    """Draw CR against the error of ω and of the centre, a curve for each horizon, its controls as lines.
+
+    Where events are labelled, a second row draws what the mover loses.
+    """
     settings = result.settings
-    drawn = style.figure(11.0, 4.3)
-    left, right = drawn.subplots(1, 2, sharey=True)
-    for colour, horizon_us in zip(_COLOURS, settings.bias.horizons_us, strict=False):
-        base = base_of("gated", settings).at(horizon_us=horizon_us)
-        zero = result.results.mean(base_of("zero", settings).at(horizon_us=horizon_us))
-        for panel, sizes, field, signs in (
-            (left, settings.bias.omega_rad_s, "omega_bias_rad_s", (1.0, -1.0)),
-            (right, settings.bias.center_px, "center_bias_px", (1.0,)),
-        ):
-            for sign in signs:
-                curve = result.results.curve(
-                    sizes,
-                    lambda size, field=field, sign=sign, base=base: base.at(**{field: sign * size or 0.0}),  # type: ignore[misc]
-                )
-                words = f"Δt = {horizon_us / 1000:g} ms" if sign > 0 else None
-                _line(panel, curve, colour, "-" if sign > 0 else "-.", words)
-            if zero is not None:
-                panel.axhline(zero, color=colour, linewidth=0.9, linestyle="--")
+    groups = [("", "events suppressed")] + ([("mover_", "mover lost")] if result.results.labelled else [])
+    drawn = style.figure(11.0, 1.2 + 3.1 * len(groups))
+    axes = drawn.subplots(len(groups), 2, sharex="col", sharey=True, squeeze=False)
+    for (left, right), (group, words) in zip(axes, groups, strict=True):
+        for colour, horizon_us in zip(_COLOURS, settings.bias.horizons_us, strict=False):
+            _biased(result, left, horizon_us, colour, "omega_bias_rad_s", group)
+            _biased(result, right, horizon_us, colour, "center_bias_px", group)
+        left.set_ylabel(words)
+        percent_axis(left)
+        percent_axis(right)
+    left, right = axes[0]
     left.plot([0.05], [0.5], **THESIS)
     left.plot([], [], color=style.MUTED, linestyle="-.", label="ω too small instead of too large")
     left.plot([], [], color=style.MUTED, linestyle="--", label="zero motion at that Δt")
+    left.plot([], [], color=style.MUTED, linestyle=":", label="reversed motion at that Δt")
+    left.set_title("a wrong angular velocity")
+    right.set_title("a wrong centre")
+    left, right = axes[-1]
     left.set_xscale("symlog", linthresh=0.05)
     right.set_xscale("symlog", linthresh=1.0)
     left.set_xlim(0, 60)
     right.set_xlim(0, 100)
     left.set_xticks([0, 0.05, 0.5, 5, 50], ["0", "0.05", "0.5", "5", "50"])
     right.set_xticks([0, 1, 10, 80], ["0", "1", "10", "80"])
-    left.set(
-        title="a wrong angular velocity", xlabel="|Δω| (rad/s); 50 rad/s = 0.05 rad/ms", ylabel="events suppressed"
-    )
-    right.set(title="a wrong centre", xlabel="‖Δc‖ (px)")
-    for panel in (left, right):
-        percent_axis(panel)
-    drawn.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=6, fontsize=7)
+    left.set_xlabel("|Δω| (rad/s); 50 rad/s = 0.05 rad/ms")
+    right.set_xlabel("‖Δc‖ (px)")
+    drawn.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=7, fontsize=7)
     return drawn
+
+
+def _biased(result: ThesisResult, panel: Axes, horizon_us: int, colour: str, field: str, group: str) -> None:
+    """Draw one horizon: errors of either sign of ω (one of the centre), zero and reversed motion."""
+    settings = result.settings
+
+    def value(row: Row) -> float:
+        return share(row, group)
+
+    turns = field == "omega_bias_rad_s"
+    sizes = settings.bias.omega_rad_s if turns else settings.bias.center_px
+    base = base_of("gated", settings).at(horizon_us=horizon_us)
+    for sign in (1.0, -1.0) if turns else (1.0,):
+        # Zero has one sign only, or it would be another point.
+        curve = result.results.curve(sizes, lambda size, sign=sign: base.at(**{field: sign * size or 0.0}), value)  # type: ignore[misc]
+        words = f"Δt = {horizon_us / 1000:g} ms" if sign > 0 else None
+        _line(panel, curve, colour, "-" if sign > 0 else "-.", words)
+    for name, dash in (("zero", "--"), ("reversed", ":")):
+        control = result.results.mean(base_of(name, settings).at(horizon_us=horizon_us), value)
+        if control is not None:
+            panel.axhline(control, color=colour, linewidth=0.9, linestyle=dash)
 
 
 def model_error(result: ThesisResult) -> Figure | None:

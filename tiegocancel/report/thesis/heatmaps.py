@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -10,14 +12,21 @@ from numpy.typing import NDArray
 
 from tiegocancel.report import style
 from tiegocancel.report.thesis.series import LOOKS, label_of
-from tiegocancel.study.thesis.experiments import GRID, SERIES
-from tiegocancel.study.thesis.ranking import rank
+from tiegocancel.study.thesis.experiments import CONTROLS, GRID, SERIES
+from tiegocancel.study.thesis.ranking import Combination, beside, rank
 from tiegocancel.study.thesis.results import share
 from tiegocancel.study.thesis.study import ThesisResult
 
 __all__ = ["gap_maps", "heatmaps", "ranking"]
 
-_ROWS = ("printed", "gated", "zero", "stream")
+_ROWS = ("printed", "gated", "zero", "reversed", "stream")
+_RANKED = ("printed", "gated", "zero", "stream")
+_MARKS: dict[str, dict[str, Any]] = {
+    "zero motion": {"marker": "D", "color": style.INK},
+    "reversed motion": {"marker": "<", "color": style.INK},
+    "mover lost": {"marker": "o", "color": style.MOVER},
+    "noise lost": {"marker": "o", "color": style.NOISE},
+}
 
 
 def heatmaps(result: ThesisResult) -> Figure | None:
@@ -42,55 +51,94 @@ def heatmaps(result: ThesisResult) -> Figure | None:
 
 
 def gap_maps(result: ThesisResult) -> Figure | None:
-    """Draw what is left of CR when zero motion's is taken off, over Δt and each gate (the best of the other)."""
-    horizons = result.settings.grid.horizons_us
-    cube = np.stack([_map(result, "gated", h) - _map(result, "zero", h) for h in horizons])
-    if not np.isfinite(cube).any():
+    """Draw what is left of CR when a control is taken off, over Δt and each gate (the best of the other).
+
+    A row for zero motion, one for reversed, and where events are labelled one for what the mover loses.
+    """
+    cubes = [
+        (words, _cube(result, "gated", group) - _cube(result, name, taken))
+        for words, group, name, taken in (
+            ("zero motion", "", "zero", ""),
+            ("reversed motion", "", "reversed", ""),
+            ("mover lost", "ego_", "gated", "mover_"),
+        )
+    ]
+    cubes = [(words, cube) for words, cube in cubes if np.isfinite(cube).any()]
+    if not cubes:
         return None
-    drawn = style.figure(10.5, 3.6)
-    panels = drawn.subplots(1, 2)
-    grid = result.settings.grid
-    filled = np.where(np.isfinite(cube), cube, -np.inf)
-    for panel, axis, ticks, words in (
-        (panels[0], 2, [f"{value:g}" for value in grid.tolerances_px], "ε_xy (px), best ε_t"),
-        (panels[1], 1, [f"{value / 1000:g}" for value in grid.tolerances_us], "ε_t (ms), best ε_xy"),
-    ):
-        best = filled.max(axis=axis).T
-        best[~np.isfinite(best)] = np.nan
-        shown = panel.imshow(best, cmap="PuOr_r", vmin=-0.9, vmax=0.9, aspect="auto", origin="lower")
-        panel.set_yticks(range(len(ticks)), ticks)
-        every = max(len(horizons) // 10, 1)
-        panel.set_xticks(range(0, len(horizons), every), [f"{h / 1000:g}" for h in horizons[::every]])
-        panel.set(xlabel="Δt (ms)", ylabel=words)
-    panels[0].set_title("CR − CR of zero motion, by gate in space")
-    panels[1].set_title("CR − CR of zero motion, by gate in time")
-    drawn.colorbar(shown, ax=panels, label="points above zero motion", format=PercentFormatter(1.0))
+    drawn = style.figure(10.5, 2.5 * len(cubes) + 0.6)
+    axes = drawn.subplots(len(cubes), 2, sharex=True, squeeze=False)
+    grid, horizons = result.settings.grid, result.settings.grid.horizons_us
+    every = max(len(horizons) // 10, 1)
+    for panels, (words, cube) in zip(axes, cubes, strict=True):
+        filled = np.where(np.isfinite(cube), cube, -np.inf)
+        for panel, axis, ticks, label in (
+            (panels[0], 2, [f"{value:g}" for value in grid.tolerances_px], "ε_xy (px), best ε_t"),
+            (panels[1], 1, [f"{value / 1000:g}" for value in grid.tolerances_us], "ε_t (ms), best ε_xy"),
+        ):
+            best = filled.max(axis=axis).T
+            best[~np.isfinite(best)] = np.nan
+            shown = panel.imshow(best, cmap="PuOr_r", vmin=-0.9, vmax=0.9, aspect="auto", origin="lower")
+            panel.set_yticks(range(len(ticks)), ticks)
+            panel.set_xticks(range(0, len(horizons), every), [f"{h / 1000:g}" for h in horizons[::every]])
+            panel.set_ylabel(label)
+            of = "ego suppressed" if words == "mover lost" else "CR"
+            panel.set_title(f"{of} − {words if words == 'mover lost' else f'CR of {words}'}")
+    for panel in axes[-1]:
+        panel.set_xlabel("Δt (ms)")
+    drawn.colorbar(shown, ax=axes, label="points above the control", format=PercentFormatter(1.0), shrink=0.8)
     return drawn
 
 
 def ranking(result: ThesisResult) -> Figure:
-    """Draw the ten best combinations of each series by CR."""
-    drawn = style.figure(10.5, 3.4)
-    axes = drawn.subplots(1, 4, sharex=True)
-    for panel, name in zip(axes, ("printed", "gated", "zero", "stream"), strict=True):
+    """Draw the ten best combinations of each series by CR, with the controls at the same combination as marks."""
+    drawn = style.figure(11.0, 4.0)
+    axes = drawn.subplots(1, len(_RANKED), sharex=True)
+    for panel, name in zip(axes, _RANKED, strict=True):
         best = rank(result, name)[:10]
         words = [f"{h / 1000:g} ms · {px:g} px · {t / 1000:g} ms" for h, px, t, _, _ in best]
-        panel.barh(range(len(best)), [line[3] for line in best], color=LOOKS[name]["color"], height=0.7)
+        panel.barh(range(len(best)), [line[3] for line in best], color=LOOKS[name]["color"], height=0.7, alpha=0.75)
         panel.set_yticks(range(len(best)), words, fontsize=7)
         panel.invert_yaxis()
         for place, line in enumerate(best):
-            panel.text(0.03, place, f"{line[3]:.1%}, {line[4] or 0:.2f} px", va="center", color="white", fontsize=6.5)
+            panel.text(1.06, place, f"{line[3]:.1%}, {line[4] or 0:.2f} px", va="center", fontsize=6.5)
+        for label, values in _controls(result, name, best).items():
+            panel.scatter(
+                values, range(len(best)), s=20, edgecolors="white", linewidths=0.7, zorder=3, label=label,
+                **_MARKS[label],
+            )  # fmt: skip
         panel.set_title(_short(name), fontsize=9)
-        panel.set_xlim(0, 1.0)
+        panel.set_xlim(0, 1.75)  # numbers stand to the right of the bars, where no mark covers them
+        panel.set_xticks([0, 0.5, 1.0])
+        panel.set_xlabel("events suppressed", loc="left", fontsize=8)
         panel.xaxis.set_major_formatter(PercentFormatter(1.0))
         style.tidy(panel, grid=None)
+    found: dict[str, Any] = {}
+    for panel in axes:
+        found |= dict(zip(*reversed(panel.get_legend_handles_labels()), strict=True))
+    if found:
+        drawn.legend(list(found.values()), list(found), loc="outside lower center", ncols=len(found), fontsize=7)
     drawn.supylabel("Δt · ε_xy · ε_t", fontsize=8)
-    drawn.supxlabel("events suppressed; in the bars CR and mean distance of the matches", fontsize=8)
     return drawn
 
 
-def _map(result: ThesisResult, name: str, horizon_us: int) -> NDArray[np.float64]:
-    """Return CR, rows ε_xy, columns ε_t, NaN where nothing was measured."""
+def _controls(result: ThesisResult, name: str, best: list[Combination]) -> dict[str, list[float]]:
+    """Return what each control has at each combination; controls without a number are left out."""
+    found = {}
+    for control in CONTROLS.get(name, ()):
+        found[f"{SERIES[control].point.motion} motion"] = [beside(result, line, control) for line in best]
+    for group in ("mover", "noise"):
+        found[f"{group} lost"] = [beside(result, line, name, f"{group}_") for line in best]
+    return {label: values for label, values in found.items() if np.isfinite(values).any()}
+
+
+def _cube(result: ThesisResult, name: str, group: str) -> NDArray[np.float64]:
+    """Return the maps of a series over all horizons, float64[Δt, ε_xy, ε_t]."""
+    return np.stack([_map(result, name, horizon_us, group) for horizon_us in result.settings.grid.horizons_us])
+
+
+def _map(result: ThesisResult, name: str, horizon_us: int, group: str = "") -> NDArray[np.float64]:
+    """Return the share of a group (CR of all), rows ε_xy, columns ε_t, NaN where nothing was measured."""
     grid = result.settings.grid
     values = np.full((len(grid.tolerances_px), len(grid.tolerances_us)), np.nan)
     for row, tolerance_px in enumerate(grid.tolerances_px):
@@ -98,7 +146,7 @@ def _map(result: ThesisResult, name: str, horizon_us: int) -> NDArray[np.float64
             point = SERIES[name].point.at(horizon_us=horizon_us, tolerance_px=tolerance_px, tolerance_us=tolerance_us)
             found = result.results.row(point)
             if found is not None:
-                values[row, column] = share(found)
+                values[row, column] = share(found, group)
     return values
 
 
@@ -117,5 +165,11 @@ def _gates(panel: Axes, result: ThesisResult) -> None:
 
 def _short(name: str) -> str:
     """Name a series in a word or two."""
-    words = {"printed": "as printed", "gated": "eq. (4.4), own off", "zero": "zero motion", "stream": "streaming"}
+    words = {
+        "printed": "as printed",
+        "gated": "eq. (4.4), own off",
+        "zero": "zero motion",
+        "reversed": "reversed",
+        "stream": "streaming",
+    }
     return words.get(name, label_of(name) if name in GRID else name)

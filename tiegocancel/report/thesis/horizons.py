@@ -24,7 +24,7 @@ def horizons(result: ThesisResult) -> Figure:
     drawn = style.figure(11.0, 5.0)
     left, right = drawn.subplots(1, 2, sharey=True)
     length_us = result.bench.windows[0].stop_us - result.bench.windows[0].start_us
-    for name in ("printed", "printed_off", "cut"):
+    for name in ("printed", "printed_zero", "printed_off", "cut"):
         draw_curve(left, _curve(result, name), name)
     top = _curve(result, "cut")
     fine = np.linspace(0, float(top.x.max()), 200)
@@ -45,10 +45,11 @@ def horizons(result: ThesisResult) -> Figure:
         for name, group, colour, words in (
             ("gated", "mover_", LOOKS["gated"]["color"], "mover lost, eq. (4.4)"),
             ("stream", "mover_", LOOKS["stream"]["color"], "mover lost, streaming"),
-            ("stream", "noise_", style.MOVER, "noise lost, streaming"),
+            ("stream", "noise_", style.NOISE, "noise lost, streaming"),
         ):
             lost = _curve(result, name, group)
-            right.plot(lost.x / 1000, lost.y, color=colour, linewidth=1.2, linestyle="-.", label=words)
+            if np.isfinite(lost.y).any():
+                right.plot(lost.x / 1000, lost.y, color=colour, linewidth=1.2, linestyle="-.", label=words)
     right.set_title("the same gates, warm-up led in or not counted")
     for panel in (left, right):
         panel.plot(*zip(*_THESIS, strict=True), **THESIS)

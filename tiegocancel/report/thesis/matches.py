@@ -22,7 +22,7 @@ def displacement(result: ThesisResult) -> Figure:
     drawn = style.figure(11.0, 3.6)
     left, right = drawn.subplots(1, 2)
     bins = np.linspace(0, 4, 41)
-    for name in ("gated", "zero"):
+    for name in ("gated", "zero", "reversed"):
         rows = [result.results.row(point) for point in grid_points(name, result.settings)]
         means = [row["mean_px"] for row in rows if row is not None and row["mean_px"] is not None]
         if means:
@@ -88,12 +88,18 @@ def agreement(result: ThesisResult) -> Figure | None:
         (0.27, "cr_stream", LOOKS["stream"]["color"], "streaming, one cell a pixel"),
     ):
         right.bar(widths + shift, [row[key] for _, row in by_gate], width=0.25, color=colour, label=words)
+    for key, dash, words in (("cr_zero", "--", "zero motion"), ("cr_reversed", ":", "reversed motion")):
+        values = [row[key] for _, row in by_gate]
+        right.hlines(
+            values, widths - 0.42, widths + 0.42, color=style.INK, linewidth=1.2, linestyle=dash,
+            label=f"streaming, {words}",
+        )  # fmt: skip
     right.set_xticks(widths, [f"{p.tolerance_px:g}" for p, _ in by_gate])
     right.set(title="events suppressed", xlabel="ε_xy (px)")
-    percent_axis(right, top=1.25)
+    percent_axis(right, top=1.5)
     right.set_yticks(np.linspace(0, 1, 6))
     right.legend(fontsize=7, loc="upper left")
-    left.legend(fontsize=7, loc="lower right")
+    drawn.legend(*left.get_legend_handles_labels(), loc="outside lower left", ncols=4, fontsize=7)
     return drawn
 
 
@@ -103,4 +109,6 @@ def _agreeing(panel: Axes, x: list[float], pairs: list[tuple[Point, Row]]) -> No
         ("recall", style.OFF, "recall: of what the reference suppresses"),
     ):
         panel.plot(x, [row[key] for _, row in pairs], color=colour, marker="o", markersize=4, label=words)
+        control = [row[f"{key}_zero"] for _, row in pairs]
+        panel.plot(x, control, color=colour, linewidth=1.0, linestyle="--", label=f"{key} of streaming, zero motion")
     percent_axis(panel)

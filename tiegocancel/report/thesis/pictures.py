@@ -67,16 +67,22 @@ def compensation(result: ThesisResult) -> Figure | None:
         return None
     drawn = style.figure(11.0, 6.6)
     parts: Any = drawn.subfigures(2, 1, height_ratios=(1.25, 1.0))
-    axes = parts[0].subplots(1, 3)
+    axes = parts[0].subplots(1, 4)
     first = result.comparisons[0]
     cx, cy = result.bench.center_px
     reach = 1.06 * result.bench.radius_px
     limit = max(float(np.percentile(np.abs(images.original[images.original != 0]), 98)), 1.0)
     for panel, name, words in zip(
-        axes, ("original", "warped", "residual"),
-        ("as they are", "warped to the middle (IWE)", f"streaming residual, {1 - first.suppressed:.0%} of the events"),
+        axes,
+        ("original", "warped", "residual", "residual_zero"),
+        (
+            "as they are",
+            "warped to the middle",
+            f"residual, {1 - first.suppressed:.0%} of events",
+            f"zero motion’s, {1 - first.suppressed_zero:.0%} of events",
+        ),
         strict=True,
-    ):  # fmt: skip
+    ):
         panel.imshow(getattr(images, name), cmap=style.SIGNED, vmin=-limit, vmax=limit, interpolation="nearest")
         panel.set(xlim=(cx - reach, cx + reach), ylim=(cy + reach, cy - reach), xticks=[], yticks=[], title=words)
         panel.set_xlabel(f"variance ×{first.variance[name]:.2f}, gradient ×{first.gradient[name]:.2f}", fontsize=8)

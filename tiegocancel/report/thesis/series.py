@@ -11,21 +11,26 @@ from tiegocancel.report import style
 from tiegocancel.study.thesis.experiments import SERIES
 from tiegocancel.study.thesis.results import Curve
 
-__all__ = ["LOOKS", "THESIS", "draw_curve", "label_of", "percent_axis"]
+__all__ = ["LOOKS", "LOST", "THESIS", "draw_curve", "label_of", "percent_axis"]
 
 THESIS: dict[str, Any] = {"color": style.INK, "marker": "x", "markersize": 7, "linestyle": "none", "label": "thesis"}
 """How the thesis's own values are marked."""
 
+LOST: dict[str, Any] = {"color": style.MOVER, "linestyle": "-.", "linewidth": 1.3}
+"""How what an independent mover loses is drawn, where a figure shows one series of it."""
+
 LOOKS: dict[str, dict[str, Any]] = {
     "printed": {"color": style.ON, "linestyle": "-"},
+    "printed_zero": {"color": style.ON, "linestyle": "--"},
     "printed_off": {"color": "#e59aa3", "linestyle": "-"},
-    "cut": {"color": style.MOVER, "linestyle": "-"},
-    "own": {"color": style.NOISE, "linestyle": "-"},
+    "cut": {"color": "#a07850", "linestyle": "-"},
+    "own": {"color": "#6fb9b0", "linestyle": "-"},
     "gated": {"color": style.RESIDUAL, "linestyle": "-"},
     "zero": {"color": style.MUTED, "linestyle": "--"},
     "reversed": {"color": style.MUTED, "linestyle": ":"},
     "stream": {"color": style.OFF, "linestyle": "-"},
     "stream_zero": {"color": "#8fb4dd", "linestyle": "--"},
+    "stream_reversed": {"color": "#8fb4dd", "linestyle": ":"},
 }
 
 

@@ -7,8 +7,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from tiegocancel.report import style
-from tiegocancel.report.thesis.series import LOOKS, THESIS, label_of, percent_axis
-from tiegocancel.study.thesis.experiments import base_of
+from tiegocancel.report.thesis.series import LOOKS, LOST, THESIS, label_of, percent_axis
+from tiegocancel.study.thesis.experiments import CONTROLS, base_of
 from tiegocancel.study.thesis.finding_space import excess
 from tiegocancel.study.thesis.results import share
 from tiegocancel.study.thesis.study import ThesisResult
@@ -26,7 +26,7 @@ def radial(result: ThesisResult) -> Figure | None:
     axes = drawn.subplots(2, 2, sharex=True)
     seen = False
     for column, horizon_us in zip(axes.T, (chosen.horizon_us, chosen.long_horizon_us), strict=True):
-        for name in ("gated", "zero", "stream"):
+        for name in ("gated", "zero", "reversed", "stream"):
             rings = _rings(result, name, horizon_us)
             if rings is None:
                 continue
@@ -39,6 +39,12 @@ def radial(result: ThesisResult) -> Figure | None:
             part = np.where(enough, suppressed / np.maximum(events, 1), np.nan)
             column[1].plot(middle, part, label=label_of(name), linewidth=1.6, **LOOKS[name])
             seen = True
+        lost = _rings(result, "gated", horizon_us, "ring_mover_")
+        if lost is not None:
+            middle, _, events, suppressed = lost
+            part = np.where(events >= _FEWEST, suppressed / np.maximum(events, 1), np.nan)
+            if np.isfinite(part).any():
+                column[1].plot(middle, part, label="mover lost, eq. (4.4)", **LOST)
         column[0].set(title=f"Δt = {horizon_us / 1000:g} ms", ylim=(0, None))
         style.tidy(column[0])
         percent_axis(column[1])
@@ -48,7 +54,7 @@ def radial(result: ThesisResult) -> Figure | None:
     axes[0, 0].set_ylabel("events a pixel")
     axes[1, 0].set_ylabel("suppressed")
     axes[0, 0].legend(fontsize=7)
-    axes[1, 0].legend(fontsize=7, loc="lower center")
+    axes[1, 0].legend(fontsize=7, loc="lower center", ncols=2)
     return drawn if seen else None
 
 
@@ -57,7 +63,7 @@ def roi(result: ThesisResult) -> Figure:
     drawn = style.figure(11.0, 3.8)
     axes = drawn.subplots(1, 3)
     horizons = [h for h in result.settings.grid.horizons_us if h <= 8000]
-    for name in ("printed", "cut", "gated", "zero", "stream"):
+    for name in ("printed", "cut", "gated", "zero", "reversed", "stream"):
         inside, outside = (
             result.results.curve(
                 horizons,
@@ -68,6 +74,16 @@ def roi(result: ThesisResult) -> Figure:
         )
         for panel, values in zip(axes, (inside.y, outside.y, inside.y - outside.y), strict=True):
             panel.plot(inside.x / 1000, values, linewidth=1.6, label=label_of(name), **LOOKS[name])
+    if result.results.labelled:
+        for group, look in (("mover_", LOST), ("noise_", LOST | {"color": style.NOISE})):
+            lost = result.results.curve(
+                horizons,
+                lambda h: base_of("gated", result.settings).at(horizon_us=int(h)),
+                lambda row, group=group: share(row, group),  # type: ignore[misc]
+            )
+            words = f"{group[:-1]} lost, eq. (4.4), on the whole sensor"
+            for panel in axes[:2] if np.isfinite(lost.y).any() else ():
+                panel.plot(lost.x / 1000, lost.y, label=words, **look)
     x = [h / 1000 for h in _ROI]
     table = np.array(list(_ROI.values()))
     for panel, column in zip(axes, (table[:, 0], table[:, 1], table[:, 0] - table[:, 1]), strict=True):
@@ -84,9 +100,9 @@ def roi(result: ThesisResult) -> Figure:
 def density(result: ThesisResult) -> Figure:
     """Draw ρ = (N_disc − N_bg)/N_bg by density, before and after (§8.6)."""
     chosen = result.settings.point
-    drawn = style.figure(9.0, 3.0)
+    drawn = style.figure(10.0, 3.4)
     axes = drawn.subplots(1, 2, sharey=True)
-    names = ("gated", "zero", "stream", "stream_zero")
+    names = ("gated", *CONTROLS["gated"], "stream", *CONTROLS["stream"])
     for panel, horizon_us in zip(axes, (chosen.horizon_us, chosen.long_horizon_us), strict=True):
         base = base_of("gated", result.settings).at(horizon_us=horizon_us)
         before = result.results.mean(base, lambda row: excess(result, row, residual=False))
@@ -111,15 +127,17 @@ def density(result: ThesisResult) -> Figure:
     return drawn
 
 
-def _rings(result: ThesisResult, name: str, horizon_us: int) -> tuple[NDArray[np.float64], ...] | None:
-    """Return middle, area, events and suppressed of each ring over all windows."""
+def _rings(
+    result: ThesisResult, name: str, horizon_us: int, group: str = "ring_"
+) -> tuple[NDArray[np.float64], ...] | None:
+    """Return middle, area, events and suppressed of each ring over all windows; ``None`` where none was counted."""
     rows = result.results.over_windows(base_of(name, result.settings).at(horizon_us=horizon_us, detail=True))
-    if not rows:
+    if not rows or f"{group}events" not in rows[0]:
         return None
     edges = np.array(rows[0]["ring_edges_px"])
     area = np.array(rows[0]["ring_areas_px"], np.float64)
-    events = np.sum([row["ring_events"] for row in rows], axis=0).astype(np.float64)
-    suppressed = np.sum([row["ring_suppressed"] for row in rows], axis=0).astype(np.float64)
+    events = np.sum([row[f"{group}events"] for row in rows], axis=0).astype(np.float64)
+    suppressed = np.sum([row[f"{group}suppressed"] for row in rows], axis=0).astype(np.float64)
     inside = area > 0
     middle = (edges[1:] + edges[:-1]) / 2
     return middle[inside], area[inside] * len(rows), events[inside], suppressed[inside]

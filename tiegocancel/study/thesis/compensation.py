@@ -15,6 +15,7 @@ from tiegocancel.estimation.contrast.fit import FitConfig, fit_rotation
 from tiegocancel.events import Events
 from tiegocancel.matching.canceller import Canceller
 from tiegocancel.matching.config import CancelConfig
+from tiegocancel.matching.many import cancel_many
 from tiegocancel.metrics.raster import gradient_energy, raster, variance
 from tiegocancel.motion.rotation import RotationTrajectory
 from tiegocancel.motion.schedule import MotionSchedule
@@ -29,12 +30,19 @@ _REPEATS = 3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Images:
-    """Signed images float64[height, width] of one window, each with its two sharpnesses."""
+    """Signed images float64[height, width] of one window.
+
+    ``*_zero`` and ``*_reversed`` are controls: the method was told that nothing moves, or that it moves the other way.
+    Warping without motion is the original.
+    """
 
     original: NDArray[np.float64]
     warped: NDArray[np.float64]
     residual: NDArray[np.float64]
     residual_warped: NDArray[np.float64]
+    warped_reversed: NDArray[np.float64]
+    residual_zero: NDArray[np.float64]
+    residual_reversed: NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +52,8 @@ class Comparison:
     ``variance`` and ``gradient`` of each image, relative to the original; ``fit_*``: contrast maximisation from scratch
     (seconds, peak bytes; ω found, ``None`` where it fails); ``warp_s``: only warping and splatting, the motion known;
     ``cancel_s`` and ``cancel_bytes`` of the streaming canceller with the motion known; ``suppressed`` share of events
-    that need not be sent; ``latency_*``: from an event to its decision, the wait included.
+    that need not be sent, ``suppressed_zero`` and ``suppressed_reversed`` that under the controls; ``latency_*``: from
+    an event to its decision, the wait included.
     """
 
     window: str
@@ -60,6 +69,8 @@ class Comparison:
     cancel_s: float
     cancel_bytes: int
     suppressed: float
+    suppressed_zero: float
+    suppressed_reversed: float
     latency_batch_us: float
     latency_event_us: float
 
@@ -101,30 +112,31 @@ def _compare(bench: Bench, place: int, settings: ThesisSettings) -> tuple[Compar
     config = CancelConfig(
         horizon_us=horizon_us, tolerance_us=gate_us, tolerance_px=settings.point.tolerance_px, ring_capacity=1 << 20
     )
-    schedule = bench.motion.schedule(horizon_us, start_us=int(window.events.t[0]), stop_us=window.stop_us)
-    suppressed, cancel_s, high_water = _cancel(window.events, config, schedule)
-    kept = part.select(~suppressed[len(window.events) - len(part) :])
+    motions = (bench.motion, bench.motion.stopped(), bench.motion.reversed())
+    schedules = [
+        motion.schedule(horizon_us, start_us=int(window.events.t[0]), stop_us=window.stop_us) for motion in motions
+    ]
+    suppressed, cancel_s, high_water = _cancel(window.events, config, schedules[0])
+    controls = cancel_many(window.events, [(config, schedule) for schedule in schedules[1:]]).suppressed
+    first = len(window.events) - len(part)
+    kept, kept_zero, kept_reversed = (part.select(~mask[first:]) for mask in (suppressed, *controls))
     warp_s = min(_timed(lambda: warped_image(part, bench.motion)) for _ in range(_REPEATS))
     images = Images(
-        original=raster(part.x, part.y, _signs(part), width=part.width, height=part.height),
+        original=_image(part),
         warped=warped_image(part, bench.motion),
-        residual=raster(kept.x, kept.y, _signs(kept), width=part.width, height=part.height),
+        residual=_image(kept),
         residual_warped=warped_image(kept, bench.motion) if len(kept) else np.zeros((part.height, part.width)),
+        warped_reversed=warped_image(part, bench.motion.reversed()),
+        residual_zero=_image(kept_zero),
+        residual_reversed=_image(kept_reversed),
     )
-    names = ("original", "warped", "residual", "residual_warped")
-    sharp = {
-        measure.__name__: {
-            name: measure(getattr(images, name)) / max(measure(images.original), 1e-12) for name in names
-        }
-        for measure in (variance, gradient_energy)
-    }
     share = len(part) / len(window.events)
     comparison = Comparison(
         window=window.name,
         events=len(part),
         horizon_us=horizon_us,
-        variance=sharp["variance"],
-        gradient=sharp["gradient_energy"],
+        variance=_relative(variance, images),
+        gradient=_relative(gradient_energy, images),
         fit_s=fit_s,
         fit_bytes=fit_bytes,
         fit_omega_rad_s=omega,
@@ -133,6 +145,8 @@ def _compare(bench: Bench, place: int, settings: ThesisSettings) -> tuple[Compar
         cancel_s=cancel_s * share,
         cancel_bytes=8 * high_water + 4 * part.width * part.height,
         suppressed=1.0 - len(kept) / len(part),
+        suppressed_zero=1.0 - len(kept_zero) / len(part),
+        suppressed_reversed=1.0 - len(kept_reversed) / len(part),
         # An event waits for the end of its window, half of it on average, and for the warp of all.
         latency_batch_us=part.span_us / 2 + warp_s * 1e6,
         latency_event_us=cancel_s / len(window.events) * 1e6,
@@ -181,6 +195,11 @@ def _timed(work: Callable[[], object]) -> float:
     begin_s = time.perf_counter()
     work()
     return time.perf_counter() - begin_s
+
+
+def _image(events: Events) -> NDArray[np.float64]:
+    """Return the signed image of events where they are."""
+    return raster(events.x, events.y, _signs(events), width=events.width, height=events.height)
 
 
 def _signs(events: Events) -> NDArray[np.int32]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from tiegocancel.study.thesis.point import Point
 from tiegocancel.study.thesis.settings import ThesisSettings
 
-__all__ = ["GRID", "SERIES", "Series", "all_points", "base_of", "grid_points"]
+__all__ = ["CONTROLS", "GRID", "MODES", "SERIES", "Series", "all_points", "base_of", "grid_points"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +28,12 @@ SERIES = {
             "printed",
             "as printed (Alg. 1), window cut out",
             Point(algorithm="printed", horizon_us=0, own=True, isolated=True),
+        ),
+        Series(
+            "printed_zero",
+            "as printed, zero motion, window cut out",
+            Point(algorithm="printed", horizon_us=0, own=True, isolated=True, motion="zero"),
+            control=True,
         ),
         Series(
             "printed_off",
@@ -52,14 +58,27 @@ SERIES = {
             Point(algorithm="stream", horizon_us=0, motion="zero"),
             control=True,
         ),
+        Series(
+            "stream_reversed",
+            "streaming, reversed",
+            Point(algorithm="stream", horizon_us=0, motion="reversed"),
+            control=True,
+        ),
     )
 }
 """Everything that CR is measured with. The first is the thesis's protocol; each next one takes one artefact away."""
 
-GRID: tuple[str, ...] = ("printed", "gated", "zero", "stream", "stream_zero")
+CONTROLS = {
+    "printed": ("printed_zero",),
+    "gated": ("zero", "reversed"),
+    "stream": ("stream_zero", "stream_reversed"),
+}
+"""The controls of a series: the same, told that nothing moves, and that it moves the other way."""
+
+GRID: tuple[str, ...] = tuple(name for true, controls in CONTROLS.items() for name in (true, *controls))
 """The series of the 525-combination sweep."""
 BIASED = ("gated", "stream")
-MODES = ("gated", "zero", "stream")
+MODES = ("gated", "zero", "reversed", "stream")
 
 
 def base_of(name: str, settings: ThesisSettings) -> Point:
@@ -104,7 +123,7 @@ def _figures(settings: ThesisSettings) -> Iterator[Point]:
             for size in bias.omega_rad_s:
                 yield from (base.at(horizon_us=horizon_us, omega_bias_rad_s=sign * size) for sign in (1.0, -1.0))
             yield from (base.at(horizon_us=horizon_us, center_bias_px=size) for size in bias.center_px)
-    for name in ("zero", "stream_zero"):
+    for name in ("zero", "reversed", "stream_zero"):
         yield from (base_of(name, settings).at(horizon_us=horizon_us) for horizon_us in bias.horizons_us)
     for name in MODES:
         for horizon_us in (chosen.horizon_us, long_us):
@@ -113,6 +132,6 @@ def _figures(settings: ThesisSettings) -> Iterator[Point]:
     for name in ("gated", "zero"):
         for horizon_us in (chosen.horizon_us, long_us):
             yield base_of(name, settings).at(horizon_us=horizon_us, adaptive=True)
-    for name in ("stream", "stream_zero"):
+    for name in ("stream", *CONTROLS["stream"]):
         for tolerance_us in settings.gates.tolerances_us:
             yield base_of(name, settings).at(horizon_us=long_us, tolerance_us=tolerance_us, detail=True)

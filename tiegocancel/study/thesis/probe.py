@@ -167,7 +167,7 @@ def _row(bench: Bench, point: Point, outcome: Outcome) -> Row:
     row["background_pairs"] = int(np.count_nonzero(pairs & ~on_disc))
     row |= _distances(outcome, first)
     if point.detail:
-        row |= _profiles(region, codes, suppressed, outcome, first)
+        row |= _profiles(region, codes, part, suppressed, outcome, first)
     return row
 
 
@@ -186,12 +186,22 @@ def _distances(outcome: Outcome, first: int) -> Row:
 
 
 def _profiles(
-    region: DiscRegion, codes: NDArray[np.int32], suppressed: NDArray[np.bool_], outcome: Outcome, first: int
+    region: DiscRegion,
+    codes: NDArray[np.int32],
+    part: Events,
+    suppressed: NDArray[np.bool_],
+    outcome: Outcome,
+    first: int,
 ) -> dict[str, Any]:
-    """Return counts by ring and the histogram of distances, as lists."""
+    """Return counts by ring, those of the mover too where events are labelled, and the histogram of distances."""
     ring = codes >> 1
     far = outcome.distance_px[outcome.met >= first]
-    return {
+    movers = {}
+    if part.label is not None:
+        mover = part.label == MOVER
+        for name, chosen in (("events", mover), ("suppressed", mover & suppressed)):
+            movers[f"ring_mover_{name}"] = np.bincount(ring[chosen], minlength=region.rings).tolist()
+    return movers | {
         "ring_edges_px": region.ring_edges_px.tolist(),
         "ring_areas_px": region.areas_px.sum(axis=1).tolist(),
         "ring_events": np.bincount(ring, minlength=region.rings).tolist(),

@@ -8,11 +8,12 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from tiegocancel.events import Events
+from tiegocancel.events import MOVER, NOISE, Events
 from tiegocancel.matching.reference import run_reference
 from tiegocancel.metrics.raster import raster
 from tiegocancel.study.thesis.point import Point
-from tiegocancel.study.thesis.probe import Bench, stream_of
+from tiegocancel.study.thesis.probe import Bench, measure, stream_of
+from tiegocancel.study.thesis.results import share
 
 __all__ = ["Panels", "panels"]
 
@@ -25,6 +26,7 @@ class Panels:
     ``combined`` and ``left`` signed images: all events, all events with every anti-event, the residual. ``left_over``
     by how much of the absolute signed image stays when the matched pairs are added up as events and anti-events,
     bilinear and nearest: the thesis's equivalence of dropping pairs and adding them (§5.6) would make it 0.
+    ``controls``: the share suppressed under zero and reversed motion, and of the mover and of noise where labelled.
     """
 
     point: Point
@@ -38,6 +40,7 @@ class Panels:
     combined: NDArray[np.float64]
     left: NDArray[np.float64]
     left_over: dict[str, float]
+    controls: dict[str, float]
 
     def median_count(self, events: Events) -> float:
         """Return the median number of events of a pixel that has any (§7.6)."""
@@ -82,4 +85,19 @@ def panels(bench: Bench, point: Point) -> Panels:
         combined=original + splat(*ahead, anti),
         left=splat(residual.x, residual.y, residual.p.astype(np.int32) * 2 - 1),
         left_over=left_over,
+        controls=_controls(bench, point, real, found.suppressed[counted]),
     )
+
+
+def _controls(bench: Bench, point: Point, real: Events, suppressed: NDArray[np.bool_]) -> dict[str, float]:
+    """Return what the point suppresses when it is told a wrong motion, and what it takes of what it should leave."""
+    controls = {}
+    for motion in ("zero", "reversed"):
+        row = measure(bench, [point.at(motion=motion).job()])[0]
+        controls[f"{motion} motion"] = share(row)
+    if real.label is not None:
+        for name, label in (("mover", MOVER), ("noise", NOISE)):
+            inside = real.label == label
+            if inside.any():
+                controls[f"the {name}" if name == "mover" else name] = float(suppressed[inside].mean())
+    return controls

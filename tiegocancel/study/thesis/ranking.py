@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-from tiegocancel.study.thesis.experiments import grid_points
+from tiegocancel.study.thesis.experiments import SERIES, grid_points
 from tiegocancel.study.thesis.results import share
 from tiegocancel.study.thesis.study import ThesisResult
 
-__all__ = ["Combination", "rank", "rank_gaps"]
+__all__ = ["Combination", "beside", "rank", "rank_gaps"]
 
 Combination = tuple[int, float, int, float, float | None]
 """Δt (µs), ε_xy (px), ε_t (µs), what it is ordered by, mean distance of the matches (px)."""
@@ -23,6 +23,15 @@ def rank(result: ThesisResult, name: str) -> list[Combination]:
         if row is not None and math.isfinite(value):
             found.append((point.horizon_us, point.tolerance_px, point.tolerance_us, value, row["mean_px"]))
     return sorted(found, key=lambda line: (-line[3], line[0], line[1], line[2]))
+
+
+def beside(result: ThesisResult, line: Combination, name: str, group: str = "") -> float:
+    """Return what a series has at a combination, of all events or of a group; NaN where it was not measured."""
+    horizon_us, tolerance_px, tolerance_us = line[:3]
+    row = result.results.row(
+        SERIES[name].point.at(horizon_us=horizon_us, tolerance_px=tolerance_px, tolerance_us=tolerance_us)
+    )
+    return float("nan") if row is None else share(row, group)
 
 
 def rank_gaps(result: ThesisResult) -> list[Combination]:

@@ -77,6 +77,23 @@ def test_thinning_keeps_the_same_share_for_every_algorithm(small_bench: Bench) -
     np.testing.assert_array_equal(kept["gated"], kept["stream"])
 
 
+def test_rings_count_the_mover_apart(small_bench: Bench) -> None:
+    row = measure(small_bench, [Point(algorithm="stream", horizon_us=2000, detail=True).job()])[0]
+    for count in ("events", "suppressed"):
+        assert sum(row[f"ring_mover_{count}"]) == row[f"mover_{count}"] > 0
+        assert all(
+            mover <= every for mover, every in zip(row[f"ring_mover_{count}"], row[f"ring_{count}"], strict=True)
+        )
+
+
+def test_as_printed_any_motion_cancels_everything_at_no_horizon(small_bench: Bench) -> None:
+    """Its own prediction lies where the event is: the thesis's ten best combinations need no motion."""
+    point = SERIES["printed_zero"].point
+    row = measure(small_bench, [point.job()])[0]
+    assert row["suppressed"] == row["events"]
+    assert row["mover_suppressed"] == row["mover_events"] > 0
+
+
 def test_every_point_is_listed_once(small_settings: ThesisSettings) -> None:
     points = all_points(ThesisSettings(), 6)
     assert len(points) == len(set(points))
@@ -95,6 +112,10 @@ def test_the_canceller_agrees_with_the_reference_and_its_single_cells_cost_littl
         assert 0.5 < row["recall"] <= 1.0
         assert row["cr_chained"] >= row["cr_stream"] - 0.01
         assert abs(row["cr_reference"] - row["cr_stream"]) < 0.15
+        assert row["cr_zero"] < row["cr_stream"] - 0.2
+        assert row["cr_reversed"] < row["cr_stream"] - 0.2
+        assert row["recall_zero"] < row["recall"] - 0.3
+        assert row["precision_zero"] < row["precision"]
     assert rows[0]["events"] > rows[-1]["events"] > 0
 
 
