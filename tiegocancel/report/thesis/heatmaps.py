@@ -92,33 +92,38 @@ def gap_maps(result: ThesisResult) -> Figure | None:
 
 def ranking(result: ThesisResult) -> Figure:
     """Draw the ten best combinations of each series by CR, with the controls at the same combination as marks."""
-    drawn = style.figure(11.0, 4.0)
-    axes = drawn.subplots(1, len(_RANKED), sharex=True)
+    drawn = style.figure(11.0, 6.6)
+    axes = drawn.subplots(2, 2, sharex=True).ravel()
     for panel, name in zip(axes, _RANKED, strict=True):
         best = rank(result, name)[:10]
+        places = np.arange(len(best))
         words = [f"{h / 1000:g} ms · {px:g} px · {t / 1000:g} ms" for h, px, t, _, _ in best]
-        panel.barh(range(len(best)), [line[3] for line in best], color=LOOKS[name]["color"], height=0.7, alpha=0.75)
-        panel.set_yticks(range(len(best)), words, fontsize=7)
+        panel.barh(places, [line[3] for line in best], color=LOOKS[name]["color"], height=0.8, alpha=0.6)
+        panel.set_yticks(places, words, fontsize=7)
         panel.invert_yaxis()
         for place, line in enumerate(best):
-            panel.text(1.06, place, f"{line[3]:.1%}, {line[4] or 0:.2f} px", va="center", fontsize=6.5)
-        for label, values in _controls(result, name, best).items():
+            panel.text(1.04, place, f"{line[3]:.1%}, {line[4] or 0:.2f} px", va="center", fontsize=7)
+        controls = _controls(result, name, best)
+        # Marks that have the same share lie above each other, not on each other.
+        for number, (label, values) in enumerate(controls.items()):
+            shift = 0.17 * (number - (len(controls) - 1) / 2)
             panel.scatter(
-                values, range(len(best)), s=20, edgecolors="white", linewidths=0.7, zorder=3, label=label,
+                values, places + shift, s=16, edgecolors="white", linewidths=0.5, zorder=3, label=label,
                 **_MARKS[label],
             )  # fmt: skip
-        panel.set_title(_short(name), fontsize=9)
-        panel.set_xlim(0, 1.75)  # numbers stand to the right of the bars, where no mark covers them
-        panel.set_xticks([0, 0.5, 1.0])
-        panel.set_xlabel("events suppressed", loc="left", fontsize=8)
-        panel.xaxis.set_major_formatter(PercentFormatter(1.0))
+        panel.set_title(_short(name))
+        panel.set_xlim(0, 1.35)  # numbers stand to the right of the bars, where no mark covers them
+        panel.set_xticks(np.linspace(0, 1, 6))
+        panel.xaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))
         style.tidy(panel, grid=None)
+    for panel in axes[2:]:
+        panel.set_xlabel("events suppressed")
     found: dict[str, Any] = {}
-    for panel in axes:
+    for panel in axes[::-1]:
         found |= dict(zip(*reversed(panel.get_legend_handles_labels()), strict=True))
     if found:
         drawn.legend(list(found.values()), list(found), loc="outside lower center", ncols=len(found), fontsize=7)
-    drawn.supylabel("Δt · ε_xy · ε_t", fontsize=8)
+    drawn.supylabel("Δt · ε_xy · ε_t", fontsize=9)
     return drawn
 
 

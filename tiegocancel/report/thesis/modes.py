@@ -88,7 +88,8 @@ def gates(result: ThesisResult) -> Figure | None:
     left.set(title="CR − CR of zero motion, by radius", xlabel="ε_t (ms)")
     left.set_ylabel("points above zero motion")
     left.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))
-    left.legend(fontsize=7)
+    left.set_ylim(top=1.25 * max(float(np.nanmax(band.gap)) for band in sizes.bands))
+    left.legend(fontsize=7, loc="upper center", ncols=2)
     style.tidy(left)
     middle = np.array([(band.low_px + band.high_px) / 2 for band in sizes.bands])
     for kind, look in (

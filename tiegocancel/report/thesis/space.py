@@ -34,7 +34,7 @@ def radial(result: ThesisResult) -> Figure | None:
             if name == "gated":
                 column[0].plot(middle, events / area, color=style.BEFORE, linewidth=1.6, label="all events")
                 column[0].fill_between(middle, events / area, color=style.BEFORE, alpha=0.15, linewidth=0)
-            column[0].plot(middle, (events - suppressed) / area, label=f"residual: {label_of(name)}", **LOOKS[name])
+            column[0].plot(middle, (events - suppressed) / area, linewidth=1.3, **LOOKS[name])
             enough = events >= _FEWEST
             part = np.where(enough, suppressed / np.maximum(events, 1), np.nan)
             column[1].plot(middle, part, label=label_of(name), linewidth=1.6, **LOOKS[name])
@@ -51,10 +51,11 @@ def radial(result: ThesisResult) -> Figure | None:
         column[1].set(xlabel="distance from the centre (px)", xlim=(0, 1.2 * result.bench.radius_px))
         for panel in column:
             panel.axvline(result.bench.radius_px, color=style.MUTED, linestyle="--", linewidth=0.8)
-    axes[0, 0].set_ylabel("events a pixel")
+    axes[0, 0].set_ylabel("events a pixel, all and residual")
     axes[1, 0].set_ylabel("suppressed")
-    axes[0, 0].legend(fontsize=7)
-    axes[1, 0].legend(fontsize=7, loc="lower center", ncols=2)
+    found = dict(zip(*reversed(axes[0, 0].get_legend_handles_labels()), strict=True))
+    found |= dict(zip(*reversed(axes[1, 0].get_legend_handles_labels()), strict=True))
+    drawn.legend(list(found.values()), list(found), loc="outside lower center", ncols=len(found), fontsize=7)
     return drawn if seen else None
 
 
@@ -82,7 +83,8 @@ def roi(result: ThesisResult) -> Figure:
                 lambda row, group=group: share(row, group),  # type: ignore[misc]
             )
             words = f"{group[:-1]} lost, eq. (4.4), on the whole sensor"
-            for panel in axes[:2] if np.isfinite(lost.y).any() else ():
+            places = axes[:1] if group == "mover_" else axes[:2]  # a mover that crosses the disc is no background
+            for panel in places if np.isfinite(lost.y).any() else ():
                 panel.plot(lost.x / 1000, lost.y, label=words, **look)
     x = [h / 1000 for h in _ROI]
     table = np.array(list(_ROI.values()))

@@ -122,7 +122,7 @@ def test_regions_and_radii_show_reversed_motion_and_the_mover(labelled: ThesisRe
     for panel in (disc, background, *along.axes[2:]):
         assert has(panel, "--", _SHARES["zero"])
         assert has(panel, ":", _SHARES["reversed"])
-        assert has(panel, "-.", _MOVER)
+        assert has(panel, "-.", _NOISE if panel is background else _MOVER)
 
 
 def test_each_of_the_best_combinations_is_marked_with_its_controls(labelled: ThesisResult) -> None:
