@@ -67,6 +67,7 @@ def test_every_command_of_the_readme_runs(readme: str, folder: Path) -> None:
         "replay",
         "run",
         "simulate",
+        "study-thesis",
         "targets",
     }
     assert {words[1] for words in ran} == verbs
