@@ -101,7 +101,7 @@ def run(args: argparse.Namespace) -> int:
     from tiegocancel.study.thesis.summary import summarise
 
     findings = summarise(result)
-    film = _film(chunks, result, folder) if thesis.video.enabled else None
+    film = _film(chunks, result, folder, notes) if thesis.video.enabled else None
     _write(args, settings, result, findings, folder, notes, film)
     return 0
 
@@ -186,15 +186,21 @@ def _motion(args: argparse.Namespace, settings: Settings, windows: tuple[Window,
     return feed.trajectory
 
 
-def _film(chunks: Callable[[], Iterable[Events]], result: ThesisResult, folder: OutputFolder) -> Path | None:
-    """Write the high-pass video from the first window on."""
+def _film(
+    chunks: Callable[[], Iterable[Events]], result: ThesisResult, folder: OutputFolder, notes: list[str]
+) -> tuple[Path, str] | None:
+    """Write the high-pass video from the first window on; return it and how it was made, or note why there is none."""
     from tiegocancel.report.thesis.video import write_video
     from tiegocancel.study.thesis.film import film_of
 
-    events, suppressed = film_of(chunks, result)
-    video = result.settings.video
-    path = write_video(folder.path, "high_pass", events, suppressed, frame_us=video.frame_us, fps=video.fps)
-    return None if path is None else folder.file(path.name)
+    film = film_of(chunks, result)
+    fps = result.settings.video.fps
+    path = write_video(folder.path, "high_pass", film.events, film.suppressed, frame_us=film.frame_us, fps=fps)
+    if path is None:
+        notes.append("no video: the warm-up leaves nothing of the recording to show")
+        sys.stderr.write(f"note: {notes[-1]}\n")
+        return None
+    return folder.file(path.name), f"Δt = {film.horizon_us / 1000:g} ms, frames of {film.frame_us / 1000:g} ms; "
 
 
 def _write(
@@ -204,7 +210,7 @@ def _write(
     findings: list[Finding],
     folder: OutputFolder,
     notes: list[str],
-    film: Path | None,
+    film: tuple[Path, str] | None,
 ) -> None:
     """Write tables, figures, page and manifest; print the summary or one JSON object."""
     from tiegocancel.report.thesis.page import write_summary_csv, write_thesis_page
@@ -227,7 +233,10 @@ def _write(
         for drawing in drawings:
             folder.file(drawing.path.name)
     title = "The thesis, rerun: " + ("built-in disc" if args.source is None else args.source.name)
-    write_thesis_page(folder.file(_PAGE), result, findings, drawings, title=title, notes=notes, video=film)
+    video, words = film or (None, "")
+    write_thesis_page(
+        folder.file(_PAGE), result, findings, drawings, title=title, notes=notes, video=video, video_words=words
+    )
     numbers = {
         "findings": [asdict(finding) for finding in findings],
         "comparisons": [asdict(comparison) for comparison in result.comparisons],

@@ -66,9 +66,13 @@ def gap_maps(result: ThesisResult) -> Figure | None:
     cubes = [(words, cube) for words, cube in cubes if np.isfinite(cube).any()]
     if not cubes:
         return None
+    # Of a window without a lead, long horizons leave nothing to be drawn.
+    drawable = np.flatnonzero(np.isfinite(cubes[0][1]).any(axis=(1, 2)))
+    horizons = result.settings.grid.horizons_us[: int(drawable[-1]) + 1]
+    cubes = [(words, cube[: len(horizons)]) for words, cube in cubes]
     drawn = style.figure(10.5, 2.5 * len(cubes) + 0.6)
     axes = drawn.subplots(len(cubes), 2, sharex=True, squeeze=False)
-    grid, horizons = result.settings.grid, result.settings.grid.horizons_us
+    grid = result.settings.grid
     every = max(len(horizons) // 10, 1)
     for panels, (words, cube) in zip(axes, cubes, strict=True):
         filled = np.where(np.isfinite(cube), cube, -np.inf)

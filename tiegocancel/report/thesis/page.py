@@ -39,8 +39,12 @@ def write_thesis_page(
     title: str,
     notes: Sequence[str],
     video: Path | None = None,
+    video_words: str = "",
 ) -> None:
-    """Write one self-contained HTML page; figures are embedded, a GIF too, an MP4 is named."""
+    """Write one self-contained HTML page; figures are embedded, a GIF too, an MP4 is named.
+
+    ``video_words`` say how the video was made.
+    """
     sheet = re.search(r"<style>.*</style>", _template(), re.DOTALL)
     assert sheet is not None  # the page of a run carries the style of both
     body = [
@@ -51,13 +55,14 @@ def write_thesis_page(
         _compensation(result.comparisons),
         _remarks(notes),
         *(_figure(drawing) for drawing in drawings),
-        _film(video),
+        _film(video, video_words),
         "<footer>Written by tiegocancel. results.csv beside this page holds every measured point, summary.csv the "
         "table above, manifest.json the configuration and the inputs’ checksums.</footer>",
     ]
     page = (
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{escape(title)} · tiegocancel</title>'
-        f"{sheet.group(0)}<style>.wide td, .wide th {{ font-size: 12.5px; }} .wide th {{ color: var(--ink); }} "
+        f"{sheet.group(0)}<style>main {{ max-width: 1240px; }} .wide tbody th {{ min-width: 120px; }}"
+        ".wide td, .wide th { font-size: 12.5px; } .wide th { color: var(--ink); } "
         ".wide td.verdict-cell { min-width: 260px; }</style></head>"
         f"<body><main>{''.join(body)}</main></body></html>\n"
     )
@@ -88,8 +93,8 @@ def _lead(result: ThesisResult) -> str:
         "<b>own off</b>, no event may meet its own prediction; <b>(4.4), pairs</b>, the text's symmetric gate with "
         "both events of a pair counted, windows cut out; <b>(4.4), own off, no warm-up</b>, the same gate one count "
         "an event, led in by what comes before the window, or else without the warm-up; <b>zero motion</b>, that "
-        "again while being told that nothing moves; <b>streaming</b>, the canceller of this package. A ratio that "
-        "zero motion reaches too shows no prediction at work.</p></section>"
+        "again while being told that nothing moves; <b>reversed</b>, that it turns the other way; <b>streaming</b>, "
+        "the canceller of this package. A ratio that zero motion reaches too shows no prediction at work.</p></section>"
     )
 
 
@@ -97,15 +102,20 @@ def _summary(findings: Sequence[Finding]) -> str:
     heads = "".join(f"<th>{escape(head)}</th>" for head in ("", "thesis", *COLUMNS.values(), "verdict"))
     rows = []
     for line in findings:
-        cells = "".join(f"<td>{escape(line.ours.get(name) or '–')}</td>" for name in COLUMNS)
+        cells = "".join(f"<td>{_number(line.ours.get(name) or '–')}</td>" for name in COLUMNS)
         rows.append(
             f"<tr><th>{escape(line.what)}<br><span class='meaning'>{escape(line.where)}</span></th>"
-            f"<td>{escape(line.thesis)}</td>{cells}<td class='verdict-cell'>{escape(line.verdict)}</td></tr>"
+            f"<td>{_number(line.thesis)}</td>{cells}<td class='verdict-cell'>{escape(line.verdict)}</td></tr>"
         )
     return (
         "<section class='card'><h2>The thesis’s figures and ours</h2><table class='wide'><thead><tr>"
         f"{heads}</tr></thead><tbody>{''.join(rows)}</tbody></table></section>"
     )
+
+
+def _number(text: str) -> str:
+    """Escape a cell whose numbers stay with their units on one line."""
+    return re.sub(r"(?<=\d) (?=%|ms|px|s\b|rad/s|points)", "&nbsp;", escape(text))
 
 
 def _slips() -> str:
@@ -139,7 +149,7 @@ def _compensation(comparisons: Sequence[Comparison]) -> str:
             lead = (one.window, told, f"{one.events:,}", f"{one.horizon_us / 1000:g} ms")
             sharp = (f"×{values[name]:.2f}" for values in (one.variance, one.gradient) for name in (warped, residual))
             cells = (*lead, *sharp, f"{1 - suppressed:.1%}", *rest)
-            rows.append("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>")
+            rows.append("<tr>" + "".join(f"<td>{_number(cell)}</td>" for cell in cells) + "</tr>")
     head = "".join(f"<th>{escape(text)}</th>" for text in heads)
     return (
         "<section class='card'><h2>Against motion compensation</h2><table class='wide'><thead><tr>"
@@ -164,7 +174,7 @@ def _figure(drawing: Drawing) -> str:
     )
 
 
-def _film(video: Path | None) -> str:
+def _film(video: Path | None, words: str) -> str:
     """Show the high-pass video."""
     if video is None:
         return ""
@@ -175,5 +185,5 @@ def _film(video: Path | None) -> str:
         shown = f'<video controls loop width="100%" src="{escape(video.name)}"></video>'
     return (
         f"<figure><h2>§6.3.1 · High-pass video</h2>{shown}<figcaption>Left all events, right what the streaming "
-        "canceller sends on at the long horizon; signed, bilinear.</figcaption></figure>"
+        f"canceller sends on; {escape(words)}signed, bilinear.</figcaption></figure>"
     )

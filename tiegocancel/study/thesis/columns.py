@@ -10,6 +10,7 @@ COLUMNS = {
     "cut": "(4.4), pairs",
     "gated": "(4.4), own off, no warm-up",
     "zero": "control: zero motion",
+    "reversed": "control: reversed",
     "stream": "streaming",
 }
 """Series of the summary's columns: the first three on windows that were cut out, as the thesis did; in the rest what

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,21 +15,40 @@ from tiegocancel.study.thesis.settings import WindowSettings
 from tiegocancel.study.thesis.study import ThesisResult
 from tiegocancel.study.thesis.windows import cut_windows
 
-__all__ = ["film_of"]
+__all__ = ["Film", "film_of"]
+
+_FEWEST_FRAMES = 4
 
 
-def film_of(chunks: Callable[[], Iterable[Events]], result: ThesisResult) -> tuple[Events, NDArray[np.bool_]]:
-    """Return the events from the first window on, as many as the video has frames for, and which are suppressed.
+@dataclass(frozen=True, slots=True, eq=False)
+class Film:
+    """The events that are shown, which of them are suppressed at ``horizon_us``, and how much a frame holds."""
 
-    At the long horizon; the warm-up comes before, or is left out where nothing comes before.
+    events: Events
+    suppressed: NDArray[np.bool_]
+    horizon_us: int
+    frame_us: int
+
+
+def film_of(chunks: Callable[[], Iterable[Events]], result: ThesisResult) -> Film:
+    """Return the events from the first window on, as many as the video has frames for.
+
+    At the long horizon; the warm-up comes before, or is left out where nothing comes before. Where that leaves less
+    than two frames, the short horizon takes its place; a stretch of less than four frames has shorter ones.
     """
+    chosen, video = result.settings.point, result.settings.video
+    film = _film(chunks, result, chosen.long_horizon_us)
+    if film.events.span_us < 2 * video.frame_us:
+        film = max(film, _film(chunks, result, chosen.horizon_us), key=lambda one: one.events.span_us)
+    return film
+
+
+def _film(chunks: Callable[[], Iterable[Events]], result: ThesisResult, horizon_us: int) -> Film:
     video, bench = result.settings.video, result.bench
-    point = base_of("stream", result.settings).at(horizon_us=result.settings.point.long_horizon_us)
-    config = point.cancel_config()
-    length_us = video.frames * video.frame_us
+    config = base_of("stream", result.settings).at(horizon_us=horizon_us).cancel_config()
     windows, _ = cut_windows(
         chunks,
-        WindowSettings(length_us=length_us, count=1, starts_s=(bench.windows[0].start_us / 1e6,)),
+        WindowSettings(length_us=video.frames * video.frame_us, count=1, starts_s=(bench.windows[0].start_us / 1e6,)),
         config.warm_up_us,
     )
     window = windows[0]
@@ -40,4 +60,6 @@ def film_of(chunks: Callable[[], Iterable[Events]], result: ThesisResult) -> tup
     suppressed = canceller.process(events).suppressed
     shown_us = max(window.start_us, int(events.t[0]) + config.warm_up_us)
     first = int(np.searchsorted(events.t, shown_us, side="left"))
-    return events[first:], suppressed[first:]
+    shown = events[first:]
+    frame_us = min(video.frame_us, max(shown.span_us // min(video.frames, _FEWEST_FRAMES), 1)) if len(shown) else 1
+    return Film(shown, suppressed[first:], horizon_us, frame_us)

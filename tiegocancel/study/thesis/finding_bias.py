@@ -24,8 +24,8 @@ def omega_bias(result: ThesisResult) -> Finding | None:
     moved = bench.radius_px * 0.05 * horizon_us * 1e-6
     halves = _bias_that_halves(result, horizon_us)
     verdict = (
-        f"0.05 rad/s move a prediction at the rim by {moved:.3f} px within {horizon_us / 1000:g} ms, a "
-        f"{settings.point.tolerance_px / max(moved, 1e-12):,.0f}th of the gate: it cannot show, and it does not"
+        f"0.05 rad/s move a prediction at the rim by {moved:.3f} px within {horizon_us / 1000:g} ms, "
+        f"1/{settings.point.tolerance_px / max(moved, 1e-12):,.0f} of the gate: it cannot show, and it does not"
     )
     verdict += f"; CR halves at {halves:g} rad/s" if halves else "; no error that was tried halves CR"
     return Finding("§7.7, Fig. 7.7", f"CR at Δω = 0.05 rad/s, {horizon_us / 1000:g} ms", "< 50 %", ours, verdict + ".")
@@ -67,7 +67,7 @@ def polarity(result: ThesisResult) -> Finding | None:
     settings = result.settings
     ours: dict[str, str | None] = {}
     values = {}
-    for name in ("gated", "zero", "stream"):
+    for name in ("gated", "zero", "reversed", "stream"):
         point = base_of(name, settings).at(horizon_us=settings.point.long_horizon_us)
         three = [result.results.mean(point.at(polarity=mode)) for mode in ("opposite", "equal", "ignore")]
         values[name] = three
