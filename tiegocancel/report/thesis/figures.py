@@ -87,8 +87,8 @@ _FIGURES: tuple[tuple[str, str, Callable[[ThesisResult], Figure | None], str], .
     ),
     (
         "sec_8_6_density", "§8.6 · Disc over background", density,
-        "Excess of the disc's event density over the background's, before and after. Zero and reversed motion lower "
-        "it too.",
+        "Excess of the disc's event density over the background's, before and after, beside zero and reversed "
+        "motion.",
     ),
     (
         "sec_8_3_gates", "§8.3 · How wide the gate in time must be", gates,

@@ -104,8 +104,8 @@ def _summary(findings: Sequence[Finding]) -> str:
     for line in findings:
         cells = "".join(f"<td>{_number(line.ours.get(name) or '–')}</td>" for name in COLUMNS)
         rows.append(
-            f"<tr><th>{escape(line.what)}<br><span class='meaning'>{escape(line.where)}</span></th>"
-            f"<td>{_number(line.thesis)}</td>{cells}<td class='verdict-cell'>{escape(line.verdict)}</td></tr>"
+            f"<tr><th>{_number(line.what)}<br><span class='meaning'>{escape(line.where)}</span></th>"
+            f"<td>{_number(line.thesis)}</td>{cells}<td class='verdict-cell'>{_number(line.verdict)}</td></tr>"
         )
     return (
         "<section class='card'><h2>The thesis’s figures and ours</h2><table class='wide'><thead><tr>"

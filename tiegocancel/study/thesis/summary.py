@@ -102,7 +102,7 @@ def _reproduced(value: float, printed: float, readings: dict[str, float | None])
 
 def _headline(result: ThesisResult) -> Finding:
     """Name the three values of one headline."""
-    series = ("printed", "gated", "zero", "stream")
+    series = ("printed", "gated", "zero", "reversed", "stream")
     best = {name: _best(result, name) for name in series}
     values = ", ".join(f"{percent(value)} ({where})" for where, value in HEADLINES)
     spread = max(value for _, value in HEADLINES) - min(value for _, value in HEADLINES)
