@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -15,6 +16,9 @@ os.environ["TI_OFFLINE_CACHE_FILE_PATH"] = str(Path(_CACHE.name) / "taichi")
 os.environ["MPLCONFIGDIR"] = str(Path(_CACHE.name) / "matplotlib")
 os.environ["MPLBACKEND"] = "Agg"
 os.environ["PYTHONSAFEPATH"] = "1"  # programs started by a test import what the test imports, not the tree around them
+
+# A shell starts what it sends to the background deaf to Ctrl-C, and tests of Ctrl-C would wait for ever.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 settings.register_profile("house", deadline=None, derandomize=bool(os.environ.get("CI")))
 settings.load_profile("house")
