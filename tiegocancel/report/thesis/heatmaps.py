@@ -112,7 +112,7 @@ def ranking(result: ThesisResult) -> Figure:
         for number, (label, values) in enumerate(controls.items()):
             shift = 0.17 * (number - (len(controls) - 1) / 2)
             panel.scatter(
-                values, places + shift, s=16, edgecolors="white", linewidths=0.5, zorder=3, label=label,
+                values, places + shift, s=26, edgecolors="white", linewidths=0.5, zorder=3, label=label,
                 **_MARKS[label],
             )  # fmt: skip
         panel.set_title(_short(name))
