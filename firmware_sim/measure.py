@@ -88,8 +88,16 @@ class Gauge:
         return Distribution.of(self.column("decided") - self.column("arrival"))
 
     def stages(self) -> dict[str, Distribution]:
-        """Describe where an event's cycles go: waiting at the input, predicting, draining, matching."""
+        """Describe where an event's cycles go: waiting at the input, predicting, draining, matching.
+
+        A firmware does the last three in one, its ``decision``.
+        """
         taken, first, issued = self.column("taken"), self.column("first"), self.column("issued")
+        if (taken == issued).all():
+            return {
+                "input FIFO": Distribution.of(taken - self.column("arrival")),
+                "decision": Distribution.of(self.column("decided") - issued),
+            }
         return {
             "input FIFO": Distribution.of(taken - self.column("arrival")),
             "predict": Distribution.of(first - taken),

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tiegocancel.firmware_sim.core.simulator import CoreTrace
@@ -41,6 +44,16 @@ def test_the_high_water_of_a_fifo_is_the_most_that_were_in_it(rows: list[tuple[i
     assert level.high_water == max(held) == level.most_by_time.max()
     assert len(level.most_by_time) == 7
     assert gauge.ring_level().high_water == len(rows) - 1
+
+
+def test_the_stages_of_a_firmware_are_two_and_those_of_a_core_four() -> None:
+    gauge = Gauge()
+    gauge.take(trace([1, 2], [3, 3], [False, True]))
+    assert list(gauge.stages()) == ["input FIFO", "decision"]
+    core = Gauge()
+    one = trace([1, 2], [3, 3], [False, True])
+    core.take(replace(one, issued=one.taken + 2, decided=one.taken + 5))
+    assert [part.mean for part in core.stages().values()] == [pytest.approx(4.0, abs=1), 0.0, 2.0, 3.0]
 
 
 def test_dropped_events_are_counted_and_left_out() -> None:
