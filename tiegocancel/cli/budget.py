@@ -55,7 +55,7 @@ def add_parser(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
     group.add_argument("--most-events", type=int, metavar="N", help="events simulated, from the beginning (1000000)")
     group.add_argument("--clock-mhz", type=float, metavar="MHZ", help="clock of the core (what the part is known for)")
     group.add_argument(
-        "--architecture", choices=("auto", "fixed"), help="simplest core that passes (auto) or the one of [core]"
+        "--architecture", choices=("auto", "fixed"), help="simplest that passes (auto), or that of [core] or [mcu]"
     )
     group.add_argument("--readout", type=float, metavar="EV_S", help="events a second that the sensor reads out")
     group.add_argument(
@@ -128,7 +128,7 @@ def run(args: argparse.Namespace) -> int:
         cancel, remark = planned.get(target.name, (settings.cancel, None))
         notes += [] if remark is None else [remark]
         with event_progress(f"judging {target.name}", None):
-            judged.append(judge_target(ground, target, cancel, settings.core, settings.budget))
+            judged.append(judge_target(ground, target, cancel, settings.core, settings.budget, mcu=settings.mcu))
     for note in notes:
         sys.stderr.write(f"note: {note}\n")
     _write(args, settings, judged, folder, notes)

@@ -8,6 +8,7 @@ from typing import Literal
 from tiegocancel.files.options import ReadOptions
 from tiegocancel.filters.config import FilterConfig
 from tiegocancel.firmware_sim.core.config import CoreConfig
+from tiegocancel.firmware_sim.mcu.config import McuConfig
 from tiegocancel.matching.config import CancelConfig
 from tiegocancel.scene.camera_config import CameraSceneConfig
 from tiegocancel.scene.config import SceneConfig
@@ -157,4 +158,5 @@ class Settings:
     scene: SceneConfig = field(default_factory=SceneConfig)
     camera_scene: CameraSceneConfig = field(default_factory=CameraSceneConfig)
     core: CoreConfig = field(default_factory=CoreConfig)
+    mcu: McuConfig = field(default_factory=McuConfig)
     budget: BudgetSettings = field(default_factory=BudgetSettings)

@@ -58,3 +58,18 @@ def test_an_unknown_part_names_the_nearest(disc: Path, tmp_path: Path, capsys: p
     assert "did you mean" in capsys.readouterr().err
     assert budget(disc, tmp_path / "out") == 2
     assert "--target: name a part or a file" in capsys.readouterr().err
+
+
+def test_a_firmware_of_ones_own_is_judged_as_it_is(
+    disc: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cycles = []
+    for code in ("ram", "flash"):
+        config = tmp_path / f"{code}.toml"
+        config.write_text(f'[mcu]\ninput = "interrupt"\ncode = "{code}"\n', encoding="utf-8")
+        flags = ("--horizon-us", "20000", "--ring-capacity", "1024", "--target", "stm32f405", "--architecture", "fixed")
+        budget(disc, tmp_path / code, *flags, "--config", str(config), "--no-figures", "--no-changes", "--json")
+        [one] = json.loads(capsys.readouterr().out)["targets"]
+        assert f"an interrupt an event, code in {code}" in one["design"]
+        cycles.append(one["cycles_per_event"]["mean"])
+    assert cycles[0] <= cycles[1]

@@ -8,6 +8,7 @@ from typing import Any
 
 from tiegocancel.firmware_sim.core.config import CoreConfig
 from tiegocancel.firmware_sim.core.simulator import narrowed
+from tiegocancel.firmware_sim.mcu.config import McuConfig
 from tiegocancel.firmware_sim.target import Target, load_memory
 from tiegocancel.firmware_sim.verdict import Verdict
 from tiegocancel.matching.canceller import Canceller
@@ -67,6 +68,7 @@ def judge_target(
     core: CoreConfig,
     settings: BudgetSettings,
     *,
+    mcu: McuConfig | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Judged:
     """Simulate a part on the ground, compare its decisions with the golden model, and look for changes on a fail."""
@@ -78,6 +80,7 @@ def judge_target(
         offer_of(settings, target),
         settings.clock_mhz * 1e6,
         settings.architecture == "fixed",
+        mcu=mcu if settings.architecture == "fixed" else None,
         external=load_memory(settings.external_memory) if settings.external_memory else None,
     )
     say(f"{target.name}: simulating")

@@ -14,9 +14,9 @@ class BudgetSettings:
 
     ``external_memory``: name or file of a memory chip that may hold the table of an FPGA; none when empty.
     ``most_events`` of the recording are simulated, from its beginning. ``clock_mhz``: 0 is what the part is known to
-    reach. ``architecture``: ``auto`` takes the simplest core that passes, ``fixed`` the one of ``[core]``. A link of 0
-    bits a second is as wide as it takes; on a microcontroller it is the fastest link of the part. ``changes``: look for
-    the smallest changes that turn a fail into a pass; at most ``most_changes`` are told.
+    reach. ``architecture``: ``auto`` takes the simplest core or firmware that passes, ``fixed`` the one of ``[core]``
+    or ``[mcu]``. A link of 0 bits a second is as wide as it takes; on a microcontroller it is the fastest link of the
+    part. ``changes``: look for the smallest changes that turn a fail into a pass; at most ``most_changes`` are told.
     """
 
     most_events: int = 1_000_000

@@ -8,6 +8,7 @@ from tiegocancel.firmware_sim.arrival import InputPath
 from tiegocancel.firmware_sim.core.config import CoreConfig
 from tiegocancel.firmware_sim.core.design import CoreDesign
 from tiegocancel.firmware_sim.core.ladder import choose_core, fits, rungs
+from tiegocancel.firmware_sim.mcu.config import McuConfig
 from tiegocancel.firmware_sim.offer import Offer
 from tiegocancel.firmware_sim.target import Target
 from tiegocancel.firmware_sim.target_fpga import FpgaTarget
@@ -32,6 +33,7 @@ class Subject:
     fixed: bool
     narrow_stamps: bool = False
     external: ExternalMemory | None = None
+    mcu: McuConfig | None = None
 
     def narrowest_stamp_bits(self, clock_hz: float) -> int:
         """Return the narrowest stamps of cells whose sweep a core has time for."""
@@ -52,7 +54,13 @@ class Subject:
         from tiegocancel.firmware_sim.mcu.judge import judge_mcu
 
         return judge_mcu(
-            target, self.cancel, motion, self.ground.events, self.offer, clock_hz=self.clock_hz or target.core.mhz * 1e6
+            target,
+            self.cancel,
+            motion,
+            self.ground.events,
+            self.offer,
+            clock_hz=self.clock_hz or target.core.mhz * 1e6,
+            config=self.mcu,
         )
 
     def may_fit(self, target: Target) -> bool:
